@@ -1,0 +1,1 @@
+//! Instruction set, container format, verifier, assembler and disassembler of Kilohertz.

@@ -1,0 +1,1 @@
+//! The native-code engine of Kilohertz.

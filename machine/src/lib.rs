@@ -1,0 +1,1 @@
+//! What both engines of Kilohertz must agree on.

@@ -1,0 +1,1 @@
+//! Tasks, clocks, watchdogs and statistics of Kilohertz.
