@@ -1,0 +1,1 @@
+//! Diagnostics as text for people: place, message, the line of source with carets, help.
