@@ -1,0 +1,5 @@
+//! The verifier: the only door to the engines.
+
+pub mod facts;
+
+pub use facts::*;
