@@ -10,4 +10,5 @@
 
 pub mod engine;
 pub mod image;
+pub mod semantics;
 pub mod trap;
