@@ -10,5 +10,6 @@
 
 pub mod engine;
 pub mod image;
+pub mod instance_map;
 pub mod semantics;
 pub mod trap;
