@@ -11,5 +11,6 @@
 pub mod engine;
 pub mod image;
 pub mod instance_map;
+pub mod library;
 pub mod semantics;
 pub mod trap;

@@ -4,17 +4,26 @@
 //! Engines inline these functions, call them, or emit code for which these are the model; nobody else defines a meaning.
 //! The dispatchers here are derived from the tables, so a row without its function does not compile.
 
+mod control;
 mod convert;
 mod float;
 mod integer;
+mod memory;
+pub(crate) mod parse;
+pub mod strings;
+mod text;
 mod value;
 
-use khz_bytecode::instruction::NumericOp;
+use khz_bytecode::instruction::{HelperOp, NumericOp};
 use khz_bytecode::trap::TrapCode;
 
+pub use control::*;
 pub use convert::*;
 pub use float::*;
 pub use integer::*;
+pub use memory::*;
+pub use strings::StringPlace;
+pub use text::{TextBuffer, write_f32, write_f64, write_time};
 pub use value::{Operand, Value};
 
 /// Defines the functions of table rows: `name(operands) -> result = expression;`. The row holds the words; here stands the meaning.
@@ -59,3 +68,41 @@ macro_rules! take_operand {
     };
 }
 khz_bytecode::for_each_numeric!(define_eval_numeric);
+
+/// Wraps what a helper returns, by its row's result.
+macro_rules! helper_result {
+    (Nothing, $call:expr) => {{
+        $call;
+        None
+    }};
+    ($result:ident, $call:expr) => {
+        Some($call.into_value())
+    };
+}
+/// The next argument of a helper: a place for `Dst` and `Src`, else a value.
+macro_rules! take_argument {
+    (Dst, $strings:ident, $values:ident) => {
+        $strings.next().unwrap_or_default()
+    };
+    (Src, $strings:ident, $values:ident) => {
+        $strings.next().unwrap_or_default()
+    };
+    ($variant:ident, $strings:ident, $values:ident) => {
+        take_operand!($variant, $values)
+    };
+}
+
+macro_rules! define_eval_helper {
+    ($(($code:literal, $variant:ident, $function:ident, $mnemonic:literal, [$($operand:ident)*] -> $result:ident, $cost:literal, $doc:literal)),* $(,)?) => {
+        /// Does one string instruction on the bytes of an image: `places` are its `Dst` and `Src` operands, `values` the others, each in
+        /// operand order. Missing ones count as empty, or as 0.
+        pub fn eval_helper(op: HelperOp, memory: &mut [u8], places: &[StringPlace], values: &[Value]) -> Option<Value> {
+            let mut places = places.iter().copied();
+            let mut values = values.iter().copied();
+            match op { $(
+                HelperOp::$variant => helper_result!($result, strings::$function(memory, $(take_argument!($operand, places, values)),*)),
+            )* }
+        }
+    };
+}
+khz_bytecode::for_each_helper!(define_eval_helper);

@@ -1,0 +1,232 @@
+//! Standard functions (IEC 61131-3 tables 28 to 36): one row a function.
+//!
+//! Conversions (`INT_TO_REAL`, `TO_REAL`, `REAL_TRUNC_DINT`) are not rows: there are hundreds, all with the shape that
+//! [`conversion`] takes apart.
+
+/// What types a parameter takes (IEC 61131-3 figure 11).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TypeClass {
+    /// Any type that has values of its own to move: elementary, string, enumeration.
+    AnyElementary,
+    /// Numbers and durations.
+    AnyMagnitude,
+    /// Integers and floating-point numbers.
+    AnyNum,
+    /// REAL and LREAL.
+    AnyReal,
+    /// Integers.
+    AnyInt,
+    /// BOOL and bit strings.
+    AnyBit,
+    /// Bit strings and integers that can be shifted; BOOL not.
+    Shiftable,
+    /// Strings.
+    AnyString,
+    /// BOOL.
+    Bool,
+    /// An integer that is no part of the generic group: a count, a position, a selector.
+    Count,
+}
+
+impl TypeClass {
+    /// Whether all parameters of such classes are brought to one common type.
+    #[must_use]
+    pub fn is_generic(self) -> bool {
+        !matches!(self, TypeClass::Bool | TypeClass::Count | TypeClass::AnyString)
+    }
+
+    /// How messages call it.
+    #[must_use]
+    pub fn describe(self) -> &'static str {
+        match self {
+            TypeClass::AnyElementary => "a value of an elementary type",
+            TypeClass::AnyMagnitude => "a number or a duration",
+            TypeClass::AnyNum => "a number",
+            TypeClass::AnyReal => "a REAL or LREAL",
+            TypeClass::AnyInt => "an integer",
+            TypeClass::AnyBit => "a BOOL or bit string",
+            TypeClass::Shiftable => "a bit string or integer",
+            TypeClass::AnyString => "a STRING",
+            TypeClass::Bool => "a BOOL",
+            TypeClass::Count => "an integer",
+        }
+    }
+}
+
+/// What type a result has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ResultRule {
+    /// The common type of the generic parameters.
+    Generic,
+    /// BOOL.
+    Bool,
+    /// INT.
+    Int,
+    /// A STRING that is long enough for every outcome.
+    String,
+    /// The integer type that the place of the call wants, DINT where it wants none.
+    WantedInteger,
+}
+
+/// A parameter.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Parameter {
+    /// Its formal name.
+    pub name: &'static str,
+    /// What it takes.
+    pub class: TypeClass,
+}
+
+/// A row of the table.
+#[derive(Debug, Clone, Copy)]
+pub struct FunctionRow {
+    /// Which function.
+    pub function: StandardFunction,
+    /// Its name.
+    pub name: &'static str,
+    /// Its parameters; of an extensible one the last stands for one or more.
+    pub parameters: &'static [Parameter],
+    /// Whether the last parameter may be repeated. `IN`, then, means `IN1`, `IN2` and so on.
+    pub extensible: bool,
+    /// Type of the result.
+    pub result: ResultRule,
+    /// What it computes.
+    pub meaning: &'static str,
+    /// Where the standard defines it.
+    pub clause: &'static str,
+}
+
+macro_rules! functions {
+    ($(($variant:ident $name:literal [$($parameter:literal $class:ident),*] $($more:ident)? -> $result:ident, $meaning:literal, $clause:literal)),* $(,)?) => {
+        /// Every standard function that is a row.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+        pub enum StandardFunction { $(#[doc = $meaning] $variant),* }
+
+        /// The rows.
+        pub static TABLE: &[FunctionRow] = &[$(FunctionRow {
+            function: StandardFunction::$variant,
+            name: $name,
+            parameters: &[$(Parameter { name: $parameter, class: TypeClass::$class }),*],
+            extensible: functions!(@more $($more)?),
+            result: ResultRule::$result,
+            meaning: $meaning,
+            clause: $clause,
+        }),*];
+    };
+    (@more more) => { true };
+    (@more) => { false };
+}
+
+functions! {
+    (Abs "ABS" ["IN" AnyNum] -> Generic, "Absolute value; of the lowest integer, itself.", "table 28"),
+    (Sqrt "SQRT" ["IN" AnyReal] -> Generic, "Square root.", "table 28"),
+    (Ln "LN" ["IN" AnyReal] -> Generic, "Natural logarithm.", "table 28"),
+    (Log "LOG" ["IN" AnyReal] -> Generic, "Logarithm to base 10.", "table 28"),
+    (Exp "EXP" ["IN" AnyReal] -> Generic, "Natural exponential.", "table 28"),
+    (Sin "SIN" ["IN" AnyReal] -> Generic, "Sine of radians.", "table 28"),
+    (Cos "COS" ["IN" AnyReal] -> Generic, "Cosine of radians.", "table 28"),
+    (Tan "TAN" ["IN" AnyReal] -> Generic, "Tangent of radians.", "table 28"),
+    (Asin "ASIN" ["IN" AnyReal] -> Generic, "Arc sine.", "table 28"),
+    (Acos "ACOS" ["IN" AnyReal] -> Generic, "Arc cosine.", "table 28"),
+    (Atan "ATAN" ["IN" AnyReal] -> Generic, "Arc tangent.", "table 28"),
+    (Atan2 "ATAN2" ["Y" AnyReal, "X" AnyReal] -> Generic, "Arc tangent of Y / X in the right quadrant.", "table 28"),
+    (Trunc "TRUNC" ["IN" AnyReal] -> WantedInteger, "Cut toward zero, saturated.", "table 22"),
+    (Add "ADD" ["IN1" AnyMagnitude, "IN2" AnyMagnitude] more -> Generic, "Sum.", "table 29"),
+    (Mul "MUL" ["IN1" AnyMagnitude, "IN2" AnyMagnitude] more -> Generic, "Product.", "table 29"),
+    (Sub "SUB" ["IN1" AnyMagnitude, "IN2" AnyMagnitude] -> Generic, "Difference.", "table 29"),
+    (Div "DIV" ["IN1" AnyMagnitude, "IN2" AnyMagnitude] -> Generic, "Quotient; of integers cut toward zero.", "table 29"),
+    (Mod "MOD" ["IN1" AnyInt, "IN2" AnyInt] -> Generic, "Remainder with the sign of the dividend.", "table 29"),
+    (Expt "EXPT" ["IN1" AnyReal, "IN2" AnyNum] -> Generic, "IN1 to the power of IN2.", "table 29"),
+    (Move "MOVE" ["IN" AnyElementary] -> Generic, "The value itself.", "table 29"),
+    (Shl "SHL" ["IN" Shiftable, "N" Count] -> Generic, "Shift left, filled with zero.", "table 30"),
+    (Shr "SHR" ["IN" Shiftable, "N" Count] -> Generic, "Shift right, filled with zero, of signed integers with the sign.", "table 30"),
+    (Rol "ROL" ["IN" Shiftable, "N" Count] -> Generic, "Rotate left in the operand's own width.", "table 30"),
+    (Ror "ROR" ["IN" Shiftable, "N" Count] -> Generic, "Rotate right in the operand's own width.", "table 30"),
+    (And "AND" ["IN1" AnyBit, "IN2" AnyBit] more -> Generic, "Bitwise AND.", "table 31"),
+    (Or "OR" ["IN1" AnyBit, "IN2" AnyBit] more -> Generic, "Bitwise OR.", "table 31"),
+    (Xor "XOR" ["IN1" AnyBit, "IN2" AnyBit] more -> Generic, "Bitwise exclusive OR.", "table 31"),
+    (Not "NOT" ["IN" AnyBit] -> Generic, "Bitwise complement.", "table 31"),
+    (Sel "SEL" ["G" Bool, "IN0" AnyElementary, "IN1" AnyElementary] -> Generic, "IN0 if G is FALSE, else IN1; both are evaluated.", "table 32"),
+    (Mux "MUX" ["K" Count, "IN0" AnyElementary, "IN1" AnyElementary] more -> Generic, "Input number K; the last one if there is none.", "table 32"),
+    (Min "MIN" ["IN1" AnyElementary, "IN2" AnyElementary] more -> Generic, "The smallest, folded from the left: b if b < a, else a.", "table 32"),
+    (Max "MAX" ["IN1" AnyElementary, "IN2" AnyElementary] more -> Generic, "The largest, folded from the left: b if b > a, else a.", "table 32"),
+    (Limit "LIMIT" ["MN" AnyElementary, "IN" AnyElementary, "MX" AnyElementary] -> Generic, "MIN(MAX(IN, MN), MX).", "table 32"),
+    (Gt "GT" ["IN1" AnyElementary, "IN2" AnyElementary] more -> Bool, "Whether each is greater than the next.", "table 33"),
+    (Ge "GE" ["IN1" AnyElementary, "IN2" AnyElementary] more -> Bool, "Whether each is at least the next.", "table 33"),
+    (Eq "EQ" ["IN1" AnyElementary, "IN2" AnyElementary] more -> Bool, "Whether all are equal.", "table 33"),
+    (Le "LE" ["IN1" AnyElementary, "IN2" AnyElementary] more -> Bool, "Whether each is at most the next.", "table 33"),
+    (Lt "LT" ["IN1" AnyElementary, "IN2" AnyElementary] more -> Bool, "Whether each is less than the next.", "table 33"),
+    (Ne "NE" ["IN1" AnyElementary, "IN2" AnyElementary] -> Bool, "Whether they differ.", "table 33"),
+    (Len "LEN" ["IN" AnyString] -> Int, "Number of characters.", "table 34"),
+    (Left "LEFT" ["IN" AnyString, "L" Count] -> String, "The first L characters.", "table 34"),
+    (Right "RIGHT" ["IN" AnyString, "L" Count] -> String, "The last L characters.", "table 34"),
+    (Mid "MID" ["IN" AnyString, "L" Count, "P" Count] -> String, "L characters from position P.", "table 34"),
+    (Concat "CONCAT" ["IN1" AnyString, "IN2" AnyString] more -> String, "One behind the other.", "table 34"),
+    (Insert "INSERT" ["IN1" AnyString, "IN2" AnyString, "P" Count] -> String, "IN2 put into IN1 after position P.", "table 34"),
+    (Delete "DELETE" ["IN" AnyString, "L" Count, "P" Count] -> String, "IN without L characters from position P.", "table 34"),
+    (Replace "REPLACE" ["IN1" AnyString, "IN2" AnyString, "L" Count, "P" Count] -> String, "IN1 with L characters from position P replaced by IN2.", "table 34"),
+    (Find "FIND" ["IN1" AnyString, "IN2" AnyString] -> Int, "Position of IN2 in IN1, 0 if it is not there.", "table 34"),
+}
+
+/// The row of a name, in any case.
+#[must_use]
+pub fn find(name: &str) -> Option<&'static FunctionRow> {
+    TABLE.iter().find(|row| row.name.eq_ignore_ascii_case(name))
+}
+
+/// The parts of a conversion's name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Conversion<'n> {
+    /// Name of the source type; absent in `TO_INT`.
+    pub from: Option<&'n str>,
+    /// Name of the target type.
+    pub to: &'n str,
+    /// Whether it cuts toward zero (`REAL_TRUNC_INT`) where it would round.
+    pub truncates: bool,
+}
+
+/// Takes the name of a conversion function apart (IEC 61131-3 tables 22 to 27): `INT_TO_REAL`, `TO_REAL`, `REAL_TRUNC_INT`, `TRUNC_INT`.
+/// Whether the parts are types is for the caller to say. `name` is in upper case.
+#[must_use]
+pub fn conversion(name: &str) -> Option<Conversion<'_>> {
+    if let Some(to) = name.strip_prefix("TO_") {
+        return Some(Conversion { from: None, to, truncates: false });
+    }
+    if let Some(to) = name.strip_prefix("TRUNC_") {
+        return Some(Conversion { from: None, to, truncates: true });
+    }
+    if let Some((from, to)) = name.split_once("_TO_") {
+        return Some(Conversion { from: Some(from), to, truncates: false });
+    }
+    let (from, to) = name.split_once("_TRUNC_")?;
+    Some(Conversion { from: Some(from), to, truncates: true })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn names_are_unique_and_found_in_any_case() {
+        assert_eq!(TABLE.iter().map(|row| row.name).collect::<BTreeSet<_>>().len(), TABLE.len());
+        assert_eq!(find("sqrt").map(|row| row.function), Some(StandardFunction::Sqrt));
+        assert!(find("SQUIRT").is_none());
+    }
+
+    #[test]
+    fn conversions_are_taken_apart() {
+        assert_eq!(conversion("INT_TO_REAL"), Some(Conversion { from: Some("INT"), to: "REAL", truncates: false }));
+        assert_eq!(conversion("TO_TIME"), Some(Conversion { from: None, to: "TIME", truncates: false }));
+        assert_eq!(conversion("REAL_TRUNC_INT"), Some(Conversion { from: Some("REAL"), to: "INT", truncates: true }));
+        assert_eq!(conversion("SQRT"), None);
+    }
+
+    #[test]
+    fn extensible_functions_have_a_parameter_to_repeat() {
+        for row in TABLE {
+            assert!(!row.parameters.is_empty(), "{}", row.name);
+            assert!(!row.extensible || row.parameters.len() >= 2, "{}", row.name);
+        }
+    }
+}
