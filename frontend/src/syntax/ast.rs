@@ -641,13 +641,13 @@ pub enum StmtKind {
     /// `FOR v := from TO to BY by DO … END_FOR`.
     For {
         /// The control variable.
-        variable: Expr,
+        variable: Box<Expr>,
         /// First value.
-        from: Expr,
+        from: Box<Expr>,
         /// Last value.
-        to: Expr,
+        to: Box<Expr>,
         /// Step; absent: 1.
-        by: Option<Expr>,
+        by: Option<Box<Expr>>,
         /// The loop's statements.
         body: Block,
         /// `END_FOR`, where the loop jumps back.
