@@ -15,7 +15,9 @@
 //! rule one row of [`verify::rules`], a container field one row of [`container::layout`].
 #![forbid(unsafe_code)]
 
+pub mod assembler;
 pub mod container;
+pub mod disassembler;
 pub mod ids;
 pub mod instruction;
 pub mod limits;

@@ -118,7 +118,7 @@ pub trait Immediate: Sized {
     ///
     /// # Errors
     /// A missing word, or one that is no value of this kind.
-    fn read_text<'w>(name: &str, words: &mut dyn Iterator<Item = &'w str>) -> Result<Self, String>;
+    fn read_text(name: &str, words: &mut dyn Iterator<Item = &str>) -> Result<Self, String>;
 }
 
 fn word<'w>(name: &str, words: &mut dyn Iterator<Item = &'w str>) -> Result<&'w str, String> {
@@ -140,7 +140,7 @@ macro_rules! number_immediate {
                 out.push_str(&self.to_string());
             }
 
-            fn read_text<'w>(name: &str, words: &mut dyn Iterator<Item = &'w str>) -> Result<Self, String> {
+            fn read_text(name: &str, words: &mut dyn Iterator<Item = &str>) -> Result<Self, String> {
                 let word = word(name, words)?;
                 word.parse().map_err(|_| format!("`{name}` can not be `{word}`"))
             }
@@ -164,7 +164,7 @@ macro_rules! id_immediate {
                 self.0.write_text(out);
             }
 
-            fn read_text<'w>(name: &str, words: &mut dyn Iterator<Item = &'w str>) -> Result<Self, String> {
+            fn read_text(name: &str, words: &mut dyn Iterator<Item = &str>) -> Result<Self, String> {
                 <$raw>::read_text(name, words).map($type)
             }
         }
@@ -197,7 +197,7 @@ macro_rules! enum_immediate {
                 out.push_str(self.name());
             }
 
-            fn read_text<'w>(name: &str, words: &mut dyn Iterator<Item = &'w str>) -> Result<Self, String> {
+            fn read_text(name: &str, words: &mut dyn Iterator<Item = &str>) -> Result<Self, String> {
                 let word = word(name, words)?;
                 $type::from_name(word).ok_or_else(|| format!("`{name}` can not be `{word}`"))
             }
@@ -224,7 +224,7 @@ impl Immediate for bool {
         out.push(if *self { '1' } else { '0' });
     }
 
-    fn read_text<'w>(name: &str, words: &mut dyn Iterator<Item = &'w str>) -> Result<Self, String> {
+    fn read_text(name: &str, words: &mut dyn Iterator<Item = &str>) -> Result<Self, String> {
         match word(name, words)? {
             "0" => Ok(false),
             "1" => Ok(true),
@@ -257,7 +257,7 @@ impl Immediate for Vec<Label> {
         out.push_str(&words.join(" "));
     }
 
-    fn read_text<'w>(name: &str, words: &mut dyn Iterator<Item = &'w str>) -> Result<Self, String> {
+    fn read_text(name: &str, words: &mut dyn Iterator<Item = &str>) -> Result<Self, String> {
         words.map(|word| word.parse().map(Label).map_err(|_| format!("`{name}` can not hold `{word}`"))).collect()
     }
 }
