@@ -11,6 +11,9 @@
 pub mod engine;
 pub mod image;
 pub mod instance_map;
+pub mod json;
 pub mod library;
+pub mod report;
 pub mod semantics;
 pub mod trap;
+pub mod variables;

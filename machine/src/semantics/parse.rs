@@ -216,9 +216,9 @@ pub(crate) fn parse_real(bytes: &[u8]) -> Option<RealText> {
 /// Fraction digits of a duration that can matter: one day has 8.64E13 nanoseconds.
 const DURATION_FRACTION_DIGITS: u32 = 18;
 
-/// A duration in nanoseconds (saturated) and the bytes it takes: the longest prefix that is a literal of table 8, with or without `T#`, `TIME#`,
+/// A duration in nanoseconds and the bytes it takes: the longest prefix that is a literal of table 8, with or without `T#`, `TIME#`,
 /// `LT#`, `LTIME#`. Units fall; only the last may have a fraction, which is cut to whole nanoseconds.
-pub(crate) fn parse_time(bytes: &[u8]) -> Option<(i64, usize)> {
+pub(crate) fn parse_time(bytes: &[u8]) -> Option<(i128, usize)> {
     let mut cursor = Cursor { bytes, at: 0 };
     let _ = ["LTIME#", "TIME#", "LT#", "T#"].iter().any(|prefix| cursor.take_word(prefix));
     let negative = cursor.sign();
@@ -235,7 +235,7 @@ pub(crate) fn parse_time(bytes: &[u8]) -> Option<(i64, usize)> {
         cursor.take(b'_');
     }
     let total = if negative { -total } else { total };
-    end.map(|end| (total.clamp(i128::from(i64::MIN), i128::from(i64::MAX)) as i64, end))
+    end.map(|end| (total, end))
 }
 
 /// One number and its unit, no larger than unit `first_unit`: nanoseconds, position of the unit, whether it had a fraction.

@@ -300,5 +300,6 @@ pub fn string_to_bool(memory: &[u8], src: StringPlace) -> i32 {
 /// The row `string_to_time`.
 #[must_use]
 pub fn string_to_time(memory: &[u8], src: StringPlace) -> i64 {
-    parse_time(src.text(memory)).map_or(0, |(duration_ns, _)| duration_ns)
+    parse_time(src.text(memory))
+        .map_or(0, |(duration_ns, _)| duration_ns.clamp(i128::from(i64::MIN), i128::from(i64::MAX)) as i64)
 }
