@@ -1,0 +1,197 @@
+//! Registers, operations and image bytes as the dispatch loop reaches them: the only file of this crate with `unsafe`.
+//!
+//! The image is reached through bounds-checked slices always: one predicted branch an access is a small price for a second line of
+//! defence behind the verifier. Registers and operations are reached without a check in release builds, because their numbers come
+//! from this crate's own translation and never from a container; debug builds and the feature `checked` check them too.
+
+/// Whether register and operation numbers are checked.
+const CHECKED: bool = cfg!(any(debug_assertions, feature = "checked"));
+
+use crate::register_form::Operation;
+
+/// The operations of a program.
+#[derive(Clone, Copy)]
+pub(crate) struct Code<'a> {
+    operations: &'a [Operation],
+}
+
+impl<'a> Code<'a> {
+    /// The operations.
+    ///
+    /// # Safety
+    /// Control flow that starts at a function's first operation must never leave `operations`: each jump target lies inside, and the
+    /// last operation of each function ends the call or jumps.
+    #[expect(unsafe_code, reason = "see the head of this file")]
+    pub(crate) unsafe fn new(operations: &'a [Operation]) -> Self {
+        Code { operations }
+    }
+
+    /// The operation at a position.
+    #[inline(always)]
+    #[expect(unsafe_code, reason = "see the head of this file")]
+    pub(crate) fn fetch(&self, position: usize) -> &'a Operation {
+        if CHECKED {
+            return &self.operations[position];
+        }
+        // SAFETY: the caller of `new` promised that control flow stays inside.
+        unsafe { self.operations.get_unchecked(position) }
+    }
+}
+
+/// The register file, seen through the window of the running call.
+pub(crate) struct Registers<'a> {
+    file: &'a mut [u64],
+    base: usize,
+}
+
+impl<'a> Registers<'a> {
+    /// The file, with an empty window at its start.
+    ///
+    /// # Safety
+    /// After each [`enter`](Self::enter) with `count` registers, `get` and `set` must be asked only for registers below `count` until the
+    /// next `enter` or `leave`; each `leave` must go back to a base that was entered before.
+    #[expect(unsafe_code, reason = "see the head of this file")]
+    pub(crate) unsafe fn new(file: &'a mut [u64]) -> Self {
+        Registers { file, base: 0 }
+    }
+
+    /// Position of the window in the file.
+    #[inline(always)]
+    pub(crate) fn base(&self) -> usize {
+        self.base
+    }
+
+    /// Moves the window to `base`, where `count` registers are to be used. False, and nothing moved, when the file is too short.
+    #[inline(always)]
+    #[must_use]
+    pub(crate) fn enter(&mut self, base: usize, count: u32) -> bool {
+        let fits = base.saturating_add(count as usize) <= self.file.len();
+        if fits {
+            self.base = base;
+        }
+        fits
+    }
+
+    /// Moves the window back to that of a caller.
+    #[inline(always)]
+    pub(crate) fn leave(&mut self, base: usize) {
+        self.base = base;
+    }
+
+    /// The bits in a register.
+    #[inline(always)]
+    #[expect(unsafe_code, reason = "see the head of this file")]
+    pub(crate) fn get(&self, register: u32) -> u64 {
+        let at = self.base + register as usize;
+        if CHECKED {
+            return self.file[at];
+        }
+        // SAFETY: `enter` checked that the window lies in the file; the caller of `new` promised that the register is in the window.
+        unsafe { *self.file.get_unchecked(at) }
+    }
+
+    /// Puts bits into a register.
+    #[inline(always)]
+    #[expect(unsafe_code, reason = "see the head of this file")]
+    pub(crate) fn set(&mut self, register: u32, bits: u64) {
+        let at = self.base + register as usize;
+        if CHECKED {
+            self.file[at] = bits;
+            return;
+        }
+        // SAFETY: as for `get`.
+        unsafe { *self.file.get_unchecked_mut(at) = bits };
+    }
+
+    /// Zeroes `count` registers from `first` on.
+    #[inline]
+    pub(crate) fn zero(&mut self, first: u32, count: u32) {
+        let first = self.base + first as usize;
+        self.file[first..first + count as usize].fill(0);
+    }
+
+    /// Moves `count` registers from `first` on to the window's start.
+    #[inline]
+    pub(crate) fn move_to_start(&mut self, first: u32, count: u32) {
+        let first = self.base + first as usize;
+        self.file.copy_within(first..first + count as usize, self.base);
+    }
+}
+
+/// A number that a register holds as bits.
+pub(crate) trait Lane: Copy {
+    /// The number of these bits.
+    fn from_bits(bits: u64) -> Self;
+    /// Its bits, zero-extended.
+    fn into_bits(self) -> u64;
+}
+
+macro_rules! lanes {
+    ($($ty:ty: |$bits:ident| $from:expr, |$value:ident| $into:expr;)*) => { $(
+        impl Lane for $ty {
+            #[inline(always)]
+            fn from_bits($bits: u64) -> Self { $from }
+
+            #[inline(always)]
+            fn into_bits(self) -> u64 {
+                let $value = self;
+                $into
+            }
+        }
+    )* };
+}
+lanes! {
+    i32: |bits| bits as i32, |value| u64::from(value as u32);
+    i64: |bits| bits as i64, |value| value as u64;
+    f32: |bits| f32::from_bits(bits as u32), |value| u64::from(value.to_bits());
+    f64: |bits| f64::from_bits(bits), |value| value.to_bits();
+}
+
+/// A scalar as it lies in memory.
+pub(crate) trait Scalar: Sized {
+    /// The bits of a register after a load.
+    fn load(bytes: &[u8], at: usize) -> u64;
+    /// Stores from the bits of a register.
+    fn store(bytes: &mut [u8], at: usize, bits: u64);
+}
+
+macro_rules! scalars {
+    ($($ty:ty: |$loaded:ident| $load:expr, |$bits:ident| $store:expr;)*) => { $(
+        impl Scalar for $ty {
+            #[inline(always)]
+            fn load(bytes: &[u8], at: usize) -> u64 {
+                let mut raw = [0; size_of::<$ty>()];
+                raw.copy_from_slice(&bytes[at..at + size_of::<$ty>()]);
+                let $loaded = <$ty>::from_le_bytes(raw);
+                $load
+            }
+
+            #[inline(always)]
+            fn store(bytes: &mut [u8], at: usize, $bits: u64) {
+                bytes[at..at + size_of::<$ty>()].copy_from_slice(&($store).to_le_bytes());
+            }
+        }
+    )* };
+}
+scalars! {
+    i8: |value| u64::from(value as u32), |bits| bits as i8;
+    u8: |value| u64::from(value), |bits| bits as u8;
+    i16: |value| u64::from(value as u32), |bits| bits as i16;
+    u16: |value| u64::from(value), |bits| bits as u16;
+    i32: |value| u64::from(value as u32), |bits| bits as i32;
+    i64: |value| value as u64, |bits| bits as i64;
+    f32: |value| u64::from(value.to_bits()), |bits| bits as u32;
+    f64: |value| value.to_bits(), |bits| bits;
+}
+
+impl Scalar for bool {
+    #[inline(always)]
+    fn load(bytes: &[u8], at: usize) -> u64 {
+        u64::from(bytes[at] != 0)
+    }
+
+    #[inline(always)]
+    fn store(bytes: &mut [u8], at: usize, bits: u64) {
+        bytes[at] = u8::from(bits as u32 != 0);
+    }
+}

@@ -1,0 +1,70 @@
+//! The rows that the register form adds to the numeric rows of the instruction table: scalar accesses and fused branches.
+//!
+//! [`for_each_operation!`] hands all of them, with the numeric rows in front, to one macro. The operation codes, what the
+//! translation looks up, and the dispatch are derived from that, so a code without a handler does not compile.
+
+/// Hands all rows to `$callback!`: `[numeric rows] [accesses] [canonical float loads] [comparisons]`.
+///
+/// - numeric row: as in [`khz_bytecode::for_each_numeric!`]; `Variant` takes its operands from registers, `function` (as a name of an
+///   operation) takes its last operand from the operation itself;
+/// - access: `(Storage, type, LoadImage, LoadBased, LoadElementImage, LoadElementBased, StoreImage, StoreBased, StoreElementImage,
+///   StoreElementBased)`. *Image*: the place counts from the image's start; *based*: from a register;
+/// - canonical float load: the four loads of an access, where any NaN may stand;
+/// - comparison: `(numeric variant, function, [operands], If, Unless, IfConst, UnlessConst)`.
+macro_rules! for_each_operation {
+    (@own $callback:ident, [$($numeric:tt),*]) => {
+        $callback! {
+            [$($numeric),*]
+            [
+                (Bool, bool, LoadBool, LoadBasedBool, LoadElementBool, LoadElementBasedBool, StoreBool, StoreBasedBool, StoreElementBool, StoreElementBasedBool),
+                (I8, i8, LoadI8, LoadBasedI8, LoadElementI8, LoadElementBasedI8, StoreI8, StoreBasedI8, StoreElementI8, StoreElementBasedI8),
+                (U8, u8, LoadU8, LoadBasedU8, LoadElementU8, LoadElementBasedU8, StoreU8, StoreBasedU8, StoreElementU8, StoreElementBasedU8),
+                (I16, i16, LoadI16, LoadBasedI16, LoadElementI16, LoadElementBasedI16, StoreI16, StoreBasedI16, StoreElementI16, StoreElementBasedI16),
+                (U16, u16, LoadU16, LoadBasedU16, LoadElementU16, LoadElementBasedU16, StoreU16, StoreBasedU16, StoreElementU16, StoreElementBasedU16),
+                (I32, i32, LoadI32, LoadBasedI32, LoadElementI32, LoadElementBasedI32, StoreI32, StoreBasedI32, StoreElementI32, StoreElementBasedI32),
+                (I64, i64, LoadI64, LoadBasedI64, LoadElementI64, LoadElementBasedI64, StoreI64, StoreBasedI64, StoreElementI64, StoreElementBasedI64),
+                (F32, f32, LoadF32, LoadBasedF32, LoadElementF32, LoadElementBasedF32, StoreF32, StoreBasedF32, StoreElementF32, StoreElementBasedF32),
+                (F64, f64, LoadF64, LoadBasedF64, LoadElementF64, LoadElementBasedF64, StoreF64, StoreBasedF64, StoreElementF64, StoreElementBasedF64)
+            ]
+            [
+                (F32, f32, canonical_f32, LoadForeignF32, LoadForeignBasedF32, LoadForeignElementF32, LoadForeignElementBasedF32),
+                (F64, f64, canonical_f64, LoadForeignF64, LoadForeignBasedF64, LoadForeignElementF64, LoadForeignElementBasedF64)
+            ]
+            [
+                (I32Eq, i32_eq, [I32 I32], IfI32Eq, UnlessI32Eq, IfI32EqConst, UnlessI32EqConst),
+                (I32Ne, i32_ne, [I32 I32], IfI32Ne, UnlessI32Ne, IfI32NeConst, UnlessI32NeConst),
+                (I32LtS, i32_lt_s, [I32 I32], IfI32LtS, UnlessI32LtS, IfI32LtSConst, UnlessI32LtSConst),
+                (I32LtU, i32_lt_u, [I32 I32], IfI32LtU, UnlessI32LtU, IfI32LtUConst, UnlessI32LtUConst),
+                (I32LeS, i32_le_s, [I32 I32], IfI32LeS, UnlessI32LeS, IfI32LeSConst, UnlessI32LeSConst),
+                (I32LeU, i32_le_u, [I32 I32], IfI32LeU, UnlessI32LeU, IfI32LeUConst, UnlessI32LeUConst),
+                (I32GtS, i32_gt_s, [I32 I32], IfI32GtS, UnlessI32GtS, IfI32GtSConst, UnlessI32GtSConst),
+                (I32GtU, i32_gt_u, [I32 I32], IfI32GtU, UnlessI32GtU, IfI32GtUConst, UnlessI32GtUConst),
+                (I32GeS, i32_ge_s, [I32 I32], IfI32GeS, UnlessI32GeS, IfI32GeSConst, UnlessI32GeSConst),
+                (I32GeU, i32_ge_u, [I32 I32], IfI32GeU, UnlessI32GeU, IfI32GeUConst, UnlessI32GeUConst),
+                (I64Eq, i64_eq, [I64 I64], IfI64Eq, UnlessI64Eq, IfI64EqConst, UnlessI64EqConst),
+                (I64Ne, i64_ne, [I64 I64], IfI64Ne, UnlessI64Ne, IfI64NeConst, UnlessI64NeConst),
+                (I64LtS, i64_lt_s, [I64 I64], IfI64LtS, UnlessI64LtS, IfI64LtSConst, UnlessI64LtSConst),
+                (I64LtU, i64_lt_u, [I64 I64], IfI64LtU, UnlessI64LtU, IfI64LtUConst, UnlessI64LtUConst),
+                (I64LeS, i64_le_s, [I64 I64], IfI64LeS, UnlessI64LeS, IfI64LeSConst, UnlessI64LeSConst),
+                (I64LeU, i64_le_u, [I64 I64], IfI64LeU, UnlessI64LeU, IfI64LeUConst, UnlessI64LeUConst),
+                (I64GtS, i64_gt_s, [I64 I64], IfI64GtS, UnlessI64GtS, IfI64GtSConst, UnlessI64GtSConst),
+                (I64GtU, i64_gt_u, [I64 I64], IfI64GtU, UnlessI64GtU, IfI64GtUConst, UnlessI64GtUConst),
+                (I64GeS, i64_ge_s, [I64 I64], IfI64GeS, UnlessI64GeS, IfI64GeSConst, UnlessI64GeSConst),
+                (I64GeU, i64_ge_u, [I64 I64], IfI64GeU, UnlessI64GeU, IfI64GeUConst, UnlessI64GeUConst),
+                (F32Eq, f32_eq, [F32 F32], IfF32Eq, UnlessF32Eq, IfF32EqConst, UnlessF32EqConst),
+                (F32Ne, f32_ne, [F32 F32], IfF32Ne, UnlessF32Ne, IfF32NeConst, UnlessF32NeConst),
+                (F32Lt, f32_lt, [F32 F32], IfF32Lt, UnlessF32Lt, IfF32LtConst, UnlessF32LtConst),
+                (F32Le, f32_le, [F32 F32], IfF32Le, UnlessF32Le, IfF32LeConst, UnlessF32LeConst),
+                (F32Gt, f32_gt, [F32 F32], IfF32Gt, UnlessF32Gt, IfF32GtConst, UnlessF32GtConst),
+                (F32Ge, f32_ge, [F32 F32], IfF32Ge, UnlessF32Ge, IfF32GeConst, UnlessF32GeConst),
+                (F64Eq, f64_eq, [F64 F64], IfF64Eq, UnlessF64Eq, IfF64EqConst, UnlessF64EqConst),
+                (F64Ne, f64_ne, [F64 F64], IfF64Ne, UnlessF64Ne, IfF64NeConst, UnlessF64NeConst),
+                (F64Lt, f64_lt, [F64 F64], IfF64Lt, UnlessF64Lt, IfF64LtConst, UnlessF64LtConst),
+                (F64Le, f64_le, [F64 F64], IfF64Le, UnlessF64Le, IfF64LeConst, UnlessF64LeConst),
+                (F64Gt, f64_gt, [F64 F64], IfF64Gt, UnlessF64Gt, IfF64GtConst, UnlessF64GtConst),
+                (F64Ge, f64_ge, [F64 F64], IfF64Ge, UnlessF64Ge, IfF64GeConst, UnlessF64GeConst)
+            ]
+        }
+    };
+}
+pub(crate) use for_each_operation;

@@ -1,0 +1,209 @@
+//! Branches, FOR loops and calls.
+
+use khz_bytecode::container::{ControlPlace, Owner};
+use khz_bytecode::ids::{ForId, FunctionId, Label, MethodId};
+use khz_bytecode::instruction::Instruction;
+use khz_bytecode::value::{IntegerType, SlotPlace, ValueType};
+use khz_bytecode::verify::FunctionFacts;
+
+use super::Translator;
+use super::stack::{Base, Pending};
+use crate::register_form::{Code, Control, ForAccess, Operation, branch_codes};
+
+/// What the translation knows of a FOR loop's step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Step {
+    /// Nothing, or several `for.enter` start it.
+    Unknown,
+    /// Its only `for.enter` has not been seen.
+    Awaited,
+    /// Its only `for.enter` gives it this value.
+    Constant(i16),
+}
+
+/// What is known of each FOR loop of a function before its translation.
+pub(super) fn awaited_steps(count: usize, facts: &FunctionFacts) -> Vec<Step> {
+    let mut entered = vec![0_usize; count];
+    for placed in &facts.instructions {
+        if let Instruction::ForEnter { id, .. } = placed.instruction
+            && let Some(times) = entered.get_mut(id.index())
+        {
+            *times += 1;
+        }
+    }
+    entered.iter().map(|times| if *times == 1 { Step::Awaited } else { Step::Unknown }).collect()
+}
+
+impl Translator<'_> {
+    pub(super) fn jump(&mut self, target: Label) {
+        self.settle_all();
+        self.jump_to(self.block_at(target));
+    }
+
+    /// `jump.if` (`when` true) or `jump.unless`, fused with the comparison before it.
+    pub(super) fn branch(&mut self, target: Label, mut when: bool) {
+        let block = self.block_at(target);
+        let (entry, own) = self.pop();
+        let computed = match entry.value {
+            Pending::Register(register) if register == own => self.last_value(own),
+            _ => None,
+        };
+        if let Some(last) = computed
+            && let Some((if_, unless)) = branch_codes(last.code)
+        {
+            self.remove_last();
+            self.settle_all();
+            let code = if when { if_ } else { unless };
+            return self.branch_to(Operation { code, ..last }, block, 0);
+        }
+        let a = match computed {
+            Some(last) if matches!(last.code, Code::I32Eqz | Code::I32Nez) => {
+                self.remove_last();
+                when ^= last.code == Code::I32Eqz;
+                last.a
+            }
+            _ => self.in_register(&entry.value, own),
+        };
+        self.settle_all();
+        let code = if when { Code::JumpIf } else { Code::JumpUnless };
+        self.branch_to(Operation { code, x: 0, dst: 0, a, b: 0 }, block, 0);
+    }
+
+    pub(super) fn switch(&mut self, targets: &[Label]) {
+        let (entry, own) = self.pop();
+        let a = self.in_register(&entry.value, own);
+        self.settle_all();
+        let start = self.program.jump_table.len();
+        self.program.jump_table.resize(start + targets.len(), 0);
+        for (index, target) in targets.iter().enumerate() {
+            let block = self.block_at(*target);
+            self.table_entry(start + index, block);
+        }
+        // At most MAX_SWITCH_TARGETS, and the verifier refuses an empty list.
+        let count = targets.len() as u32;
+        self.effect(Operation { code: Code::Switch, x: 0, dst: count, a, b: start as u32 });
+    }
+
+    /// Position of a new row for a FOR loop in the program's table.
+    fn for_access(&mut self, id: ForId) -> ForAccess {
+        let descriptor = self.function.for_loops[id.index()];
+        let (base, offset) = match descriptor.control {
+            ControlPlace::Slot(SlotPlace::Local, index) => {
+                return self.for_access_at(id, Control::Register(self.local_register(index)));
+            }
+            ControlPlace::Slot(place, index) => self.slot_address(place, index),
+            ControlPlace::Bytes(place, offset) => {
+                let (base, start) = self.base_of(place);
+                (base, start + offset)
+            }
+        };
+        let control = match base {
+            Base::Image => Control::Image(offset),
+            Base::Register(register) => Control::Based(register, offset),
+        };
+        self.for_access_at(id, control)
+    }
+
+    fn for_access_at(&self, id: ForId, control: Control) -> ForAccess {
+        let descriptor = self.function.for_loops[id.index()];
+        let (bound, step) = (self.local_register(descriptor.bound), self.local_register(descriptor.step));
+        ForAccess { kind: descriptor.ty, control, bound, step }
+    }
+
+    pub(super) fn for_enter(&mut self, id: ForId, exit: Label) {
+        let depth = self.stack.len();
+        if self.steps[id.index()] == Step::Awaited {
+            let step = match self.stack[depth - 1].value {
+                Pending::Constant(bits) => Some(match self.function.for_loops[id.index()].ty.value_type() {
+                    ValueType::I64 => bits as i64,
+                    _ => i64::from(bits as i32),
+                }),
+                _ => None,
+            };
+            let step = step.filter(|step| *step != 0).and_then(|step| i16::try_from(step).ok());
+            self.steps[id.index()] = step.map_or(Step::Unknown, Step::Constant);
+        }
+        self.settle_all();
+        self.stack.truncate(depth - 3);
+        let b = self.next_register();
+        let access = self.for_access(id);
+        let a = self.program.for_loops.len() as u32;
+        self.program.for_loops.push(access);
+        let block = self.block_at(exit);
+        self.branch_to(Operation { code: Code::ForEnter, x: 0, dst: 0, a, b }, block, 0);
+    }
+
+    pub(super) fn for_next(&mut self, id: ForId, header: Label) {
+        self.settle_all();
+        let block = self.block_at(header);
+        let skip = u32::from(self.header_fuel[block].is_some());
+        let access = self.for_access(id);
+        let mut loops = self.facts.loops.iter().filter(|l| l.header.index() == block);
+        let is_for_loop = loops.next().is_some_and(|l| l.for_loop == Some(id));
+        let code = match access.kind {
+            IntegerType::I32 => Some(Code::ForNextI32),
+            IntegerType::I16 => Some(Code::ForNextI16),
+            _ => None,
+        };
+        if let (true, Some(code), Control::Register(a), Step::Constant(x)) =
+            (is_for_loop, code, access.control, self.steps[id.index()])
+        {
+            let operation = Operation { code, x, dst: 0, a, b: access.bound };
+            return self.branch_to(operation, block, skip);
+        }
+        let a = self.program.for_loops.len() as u32;
+        self.program.for_loops.push(access);
+        self.branch_to(Operation { code: Code::ForNext, x: 0, dst: 0, a, b: 0 }, block, skip);
+    }
+
+    /// Settles the arguments of a call and takes them from the stack: the register that its window starts at.
+    fn arguments(&mut self, count: usize) -> u32 {
+        self.settle_elements();
+        let first = self.stack.len() - count;
+        for depth in first..self.stack.len() {
+            self.settle(depth);
+        }
+        self.stack.truncate(first);
+        self.next_register()
+    }
+
+    pub(super) fn call(&mut self, callee: FunctionId) {
+        let function = &self.verified.container().functions[callee.index()];
+        let this = usize::from(matches!(function.owner, Owner::Block(_)));
+        let results = function.results.len();
+        let a = self.arguments(usize::from(function.parameters) + this);
+        let (dst, b) = (self.facts.frame_bytes, u32::from(callee.0));
+        self.effect(Operation { code: Code::Call, x: 0, dst, a, b });
+        self.windows.call(a, callee);
+        (0..results).for_each(|_| self.push_result());
+    }
+
+    pub(super) fn call_virtual(&mut self, method: MethodId) {
+        let signature = &self.verified.container().types.methods[method.index()];
+        let results = signature.results.len();
+        let a = self.arguments(signature.parameters.len() + 1);
+        let (dst, b) = (self.facts.frame_bytes, u32::from(method.0));
+        self.effect(Operation { code: Code::CallVirtual, x: 0, dst, a, b });
+        self.windows.call_virtual();
+        (0..results).for_each(|_| self.push_result());
+    }
+
+    pub(super) fn return_(&mut self) {
+        let results = self.function.results.len();
+        // A result that stands unchecked does not exist: results are numbers.
+        let operation = match results {
+            0 => Operation { code: Code::Return, x: 0, dst: 0, a: 0, b: 0 },
+            1 => {
+                let (entry, own) = self.pop();
+                let a = self.in_register(&entry.value, own);
+                Operation { code: Code::ReturnOne, x: 0, dst: 0, a, b: 0 }
+            }
+            _ => {
+                self.settle_all();
+                let b = results as u32;
+                Operation { code: Code::ReturnMany, x: 0, dst: 0, a: self.registers.stack, b }
+            }
+        };
+        self.effect(operation);
+    }
+}

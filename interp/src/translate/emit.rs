@@ -1,0 +1,132 @@
+//! Appending operations, and the jump targets that are known only at the end of a function.
+
+use khz_bytecode::ids::Label;
+
+use super::Translator;
+use crate::register_form::{Code, Operation};
+
+/// A jump target to be filled in when all blocks have their places.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Patch {
+    /// What holds the target.
+    pub at: PatchPlace,
+    /// Block to go to.
+    pub block: usize,
+    /// 1 to go behind the block's header operation, because the jump does its check; else 0.
+    pub skip: u32,
+}
+
+/// What holds a jump target.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum PatchPlace {
+    /// `dst` of an operation.
+    Operation(usize),
+    /// An entry of the jump table.
+    Table(usize),
+}
+
+impl Translator<'_> {
+    fn append(&mut self, operation: Operation, origin: u32) {
+        self.program.operations.push(operation);
+        self.program.origins.push(origin);
+    }
+
+    /// Appends an operation whose only effect is to write register `dst` from other operands: a later one may redirect it.
+    pub(super) fn value(&mut self, operation: Operation) {
+        self.value_from(operation, self.origin);
+    }
+
+    /// As [`Self::value`], for a trap that belongs to the instruction at `origin`.
+    pub(super) fn value_from(&mut self, operation: Operation, origin: u32) {
+        self.append(operation, origin);
+        self.last_result = Some(operation.dst);
+    }
+
+    /// Appends any other operation.
+    pub(super) fn effect(&mut self, operation: Operation) {
+        self.effect_from(operation, self.origin);
+    }
+
+    /// As [`Self::effect`], for a trap that belongs to the instruction at `origin`.
+    pub(super) fn effect_from(&mut self, operation: Operation, origin: u32) {
+        self.append(operation, origin);
+        self.last_result = None;
+    }
+
+    /// The last operation, when it just computed `register` and nothing else.
+    pub(super) fn last_value(&self, register: u32) -> Option<Operation> {
+        self.last_result.filter(|last| *last == register)?;
+        self.program.operations.last().copied()
+    }
+
+    /// Redirects the last operation to write `register` instead.
+    pub(super) fn redirect_last(&mut self, register: u32) {
+        if let Some(last) = self.program.operations.last_mut() {
+            last.dst = register;
+            self.last_result = Some(register);
+        }
+    }
+
+    /// Takes the last operation back.
+    pub(super) fn remove_last(&mut self) {
+        self.program.operations.pop();
+        self.program.origins.pop();
+        self.last_result = None;
+    }
+
+    /// Position of a 64-bit operand in the constants.
+    pub(super) fn constant_number(&mut self, bits: u64) -> u32 {
+        // Constants of one function are few; looking at the last ones finds most repetitions.
+        let constants = &mut self.program.constants;
+        let recent = constants.len().saturating_sub(32);
+        if let Some(at) = constants[recent..].iter().position(|constant| *constant == bits) {
+            return (recent + at) as u32;
+        }
+        constants.push(bits);
+        (constants.len() - 1) as u32
+    }
+
+    /// The block that starts at a label.
+    pub(super) fn block_at(&self, label: Label) -> usize {
+        let starts = &self.facts.blocks;
+        let found = starts.binary_search_by_key(&label.0, |block| {
+            self.facts.instructions.get(block.start).map_or(u32::MAX, |first| first.offset)
+        });
+        // The verifier proved that each target starts a block.
+        found.unwrap_or_else(|before| before.saturating_sub(1))
+    }
+
+    /// Appends a branch to a block. `skip`: see [`Patch::skip`].
+    pub(super) fn branch_to(&mut self, operation: Operation, block: usize, skip: u32) {
+        let at = PatchPlace::Operation(self.program.operations.len());
+        self.patches.push(Patch { at, block, skip });
+        self.effect(operation);
+    }
+
+    /// Appends a jump to a block, unless it is the next one.
+    pub(super) fn jump_to(&mut self, block: usize) {
+        if block == self.block + 1 {
+            return;
+        }
+        // A jump back goes to a loop header: it does the header's check itself.
+        let back = block <= self.block && self.header_fuel[block].is_some();
+        let code = if back { Code::Repeat } else { Code::Jump };
+        self.branch_to(Operation { code, x: 0, dst: 0, a: 0, b: 0 }, block, u32::from(back));
+    }
+
+    /// Fills in all jump targets of the function.
+    pub(super) fn apply_patches(&mut self) {
+        for patch in std::mem::take(&mut self.patches) {
+            let target = self.block_starts[patch.block] + patch.skip;
+            match patch.at {
+                PatchPlace::Operation(at) => self.program.operations[at].dst = target,
+                PatchPlace::Table(at) => self.program.jump_table[at] = target,
+            }
+        }
+    }
+
+    /// Notes that jump table entry `at` goes to a block.
+    pub(super) fn table_entry(&mut self, at: usize, block: usize) {
+        self.patches.push(Patch { at: PatchPlace::Table(at), block, skip: 0 });
+    }
+}

@@ -1,0 +1,145 @@
+//! Numbers: numeric rows, constants, range checks, string helpers.
+
+use khz_bytecode::container::Constant;
+use khz_bytecode::ids::ConstantId;
+use khz_bytecode::instruction::{HelperOp, MAX_CAPACITIES, NumericOp};
+use khz_bytecode::value::{IntegerType, Storage, ValueType};
+
+use super::Translator;
+use super::stack::Pending;
+use crate::register_form::{
+    Code, Operation, RangeCheck, access_codes, branch_codes, helper_number, numeric_code, numeric_const_code,
+};
+
+/// The operation that wraps a value as a store to an `L` slot of this storage and a load from it would; none where that changes nothing.
+pub(super) fn wrap_code(storage: Storage) -> Option<Code> {
+    match storage {
+        Storage::Bool => Some(Code::I32Nez),
+        Storage::I8 => Some(Code::I32Extend8S),
+        Storage::U8 => Some(Code::I32Extend8U),
+        Storage::I16 => Some(Code::I32Extend16S),
+        Storage::U16 => Some(Code::I32Extend16U),
+        Storage::I32 | Storage::I64 | Storage::F32 | Storage::F64 => None,
+    }
+}
+
+/// A constant as a store to an `L` slot of this storage and a load from it would leave it.
+pub(super) fn wrap_constant(storage: Storage, bits: u64) -> u64 {
+    let signed = |value: i32| u64::from(value as u32);
+    match storage {
+        Storage::Bool => u64::from(bits as u32 != 0),
+        Storage::I8 => signed(i32::from(bits as i8)),
+        Storage::U8 => u64::from(bits as u8),
+        Storage::I16 => signed(i32::from(bits as i16)),
+        Storage::U16 => u64::from(bits as u16),
+        Storage::I32 | Storage::I64 | Storage::F32 | Storage::F64 => bits,
+    }
+}
+
+/// Whether the result of an operation is already as [`wrap_code`] would make it.
+pub(super) fn is_wrapped(code: Code, storage: Storage) -> bool {
+    let load = access_codes(storage).load;
+    let by_load = [load.image, load.based, load.element, load.element_based].contains(&code);
+    let is_bool = matches!(code, Code::I32Eqz | Code::I32Nez | Code::I64Eqz | Code::I64Nez | Code::LoadBit);
+    let by_type = storage == Storage::Bool && (is_bool || branch_codes(code).is_some());
+    by_load || by_type || wrap_code(storage) == Some(code)
+}
+
+/// Whether the operands may change places.
+fn is_commutative(op: NumericOp) -> bool {
+    use NumericOp::{
+        I32Add, I32And, I32Eq, I32Mul, I32Ne, I32Or, I32Xor, I64Add, I64And, I64Eq, I64Mul, I64Ne, I64Or, I64Xor,
+    };
+    matches!(
+        op,
+        I32Add
+            | I32And
+            | I32Eq
+            | I32Mul
+            | I32Ne
+            | I32Or
+            | I32Xor
+            | I64Add
+            | I64And
+            | I64Eq
+            | I64Mul
+            | I64Ne
+            | I64Or
+            | I64Xor
+    )
+}
+
+impl Translator<'_> {
+    pub(super) fn constant(&mut self, id: ConstantId) {
+        let bits = match self.verified.container().constants[id.index()] {
+            Constant::I64(value) => value as u64,
+            Constant::F32(bits) => u64::from(bits),
+            Constant::F64(bits) => bits,
+        };
+        self.push(Pending::Constant(bits));
+    }
+
+    pub(super) fn numeric(&mut self, op: NumericOp) {
+        if op.trap().is_some() {
+            self.settle_elements();
+        }
+        let (mut last, mut last_own) = self.pop();
+        let mut first = None;
+        if op.operands().len() == 2 {
+            let (mut entry, mut own) = self.pop();
+            if is_commutative(op) && matches!(entry.value, Pending::Constant(_)) {
+                (entry, last, own, last_own) = (last, entry, last_own, own);
+            }
+            first = Some(self.in_register(&entry.value, own));
+        }
+        let dst = self.next_register();
+        let operation = match last.value {
+            Pending::Constant(bits) => {
+                let b = self.own_operand(op, bits);
+                Operation { code: numeric_const_code(op), x: 0, dst, a: first.unwrap_or(0), b }
+            }
+            other => {
+                let register = self.in_register(&other, last_own);
+                let (a, b) = first.map_or((register, 0), |first| (first, register));
+                Operation { code: numeric_code(op), x: 0, dst, a, b }
+            }
+        };
+        self.value(operation);
+        self.push_result();
+    }
+
+    /// The last operand of a numeric row as the operation itself carries it.
+    fn own_operand(&mut self, op: NumericOp, bits: u64) -> u32 {
+        match op.operands().last() {
+            Some(ValueType::I64 | ValueType::F64) => self.constant_number(bits),
+            _ => bits as u32,
+        }
+    }
+
+    pub(super) fn check_range(&mut self, kind: IntegerType, lower: i64, upper: i64) {
+        self.settle_elements();
+        let (entry, own) = self.pop();
+        let a = self.in_register(&entry.value, own);
+        let range = RangeCheck { kind, lower, upper };
+        let b = self.program.ranges.len() as u32;
+        self.program.ranges.push(range);
+        self.effect(Operation { code: Code::CheckRange, x: 0, dst: 0, a, b });
+        self.push(Pending::Register(a));
+    }
+
+    pub(super) fn helper(&mut self, op: HelperOp, capacities: [u16; MAX_CAPACITIES]) {
+        self.settle_elements();
+        let first = self.stack.len() - op.operands().len();
+        for depth in first..self.stack.len() {
+            self.settle(depth);
+        }
+        self.stack.truncate(first);
+        let dst = self.next_register();
+        let b = self.program.capacities.len() as u32;
+        self.program.capacities.push(capacities);
+        self.effect(Operation { code: Code::Helper, x: helper_number(op), dst, a: dst, b });
+        if op.result().is_some() {
+            self.push_result();
+        }
+    }
+}
