@@ -14,6 +14,14 @@ pub const FRAME_ALIGN_BYTES: u32 = 8;
 pub const MAX_DIMENSIONS: usize = 8;
 /// Deepest nesting of types (a structure in an array in a structure…).
 pub const MAX_TYPE_DEPTH: usize = 64;
+/// Most alternatives that nested unions may multiply to: what a lookup in them may have to try.
+pub const MAX_UNION_ALTERNATIVES: u32 = 256;
+/// Deepest nesting of loops in a function.
+pub const MAX_LOOP_DEPTH: u16 = 64;
+/// Most `l` slots that hold references beside the parameters of one function.
+pub const MAX_REFERENCE_LOCALS: usize = 1024;
+/// Most entries that the verifier's lists (stacks at block starts, effects of functions) may have in total.
+pub const MAX_ANALYSIS_ENTRIES: usize = 8 << 20;
 /// Largest operand stack a function may need.
 pub const MAX_STACK_DEPTH: u16 = 4096;
 /// Largest call nesting a container may ask for.

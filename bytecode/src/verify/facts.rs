@@ -16,7 +16,6 @@ pub struct Verified {
 
 impl Verified {
     /// For the verifier only.
-    #[allow(dead_code, reason = "the verifier's last step")]
     pub(super) fn new(container: Container, facts: Facts) -> Self {
         Verified { container, facts }
     }
@@ -113,9 +112,9 @@ pub struct BasicBlock {
     pub end: usize,
     /// Operand stack at its start, bottom first; the same on every way in.
     pub entry_stack: Vec<StackType>,
-    /// Where its last instruction may go: the targets of a jump in their order, then the fall-through.
+    /// Where its last instruction may go: the targets of a jump in their order (one for each, equal ones too), then the fall-through.
     pub successors: Vec<BlockId>,
-    /// From where it is reached, ascending.
+    /// From where it is reached, ascending, each once.
     pub predecessors: Vec<BlockId>,
     /// Innermost loop that it belongs to.
     pub innermost_loop: Option<LoopId>,
@@ -159,6 +158,8 @@ pub struct Effects {
     pub bytes_read: BTreeSet<KnownPlace>,
     /// Scalars it may write at known places.
     pub bytes_written: BTreeSet<KnownPlace>,
+    /// Types of targets that it may read through references (scalars, strings, copies).
+    pub read_through_references: BTreeSet<TypeId>,
     /// Types of targets that it may write through references (scalars, strings, copies).
     pub written_through_references: BTreeSet<TypeId>,
     /// Whether it may write through a reference that was made from an integer.
