@@ -263,7 +263,7 @@ mod tests {
         let mut map = SourceMap::new();
         let (id, diagnostics) = map.add_bytes("a.st", bytes);
         let text = map.file(id).map(|file| file.text().to_owned()).unwrap_or_default();
-        (text, diagnostics.iter().map(|found| found.code()).collect())
+        (text, diagnostics.iter().map(Diagnostic::code).collect())
     }
 
     #[test]

@@ -68,8 +68,8 @@ rules! {
     }
     BAD_STRING = "P0013" Error "a string with something wrong inside" {
         "After `$` one of `$ ' \" L N P R T` or hexadecimal digits must come. A STRING holds Latin-1 characters; others need a WSTRING."
-        wrong "PROGRAM p\nVAR\n  s : STRING := 'costs 5$';\nEND_VAR\nEND_PROGRAM\n"
-        right "PROGRAM p\nVAR\n  s : STRING := 'costs 5$$';\nEND_VAR\nEND_PROGRAM\n"
+        wrong "PROGRAM p\nVAR\n  s : STRING := 'costs $5';\nEND_VAR\nEND_PROGRAM\n"
+        right "PROGRAM p\nVAR\n  s : STRING := 'costs $$5';\nEND_VAR\nEND_PROGRAM\n"
     }
     BAD_ADDRESS = "P0014" Error "a direct address that cannot be read" {
         "A direct address is `%`, then I, Q or M, then the size X, B, W, D or L, then numbers with dots: `%IX0.0`, `%QW3`, `%MD4`."

@@ -210,13 +210,21 @@ impl Parser<'_> {
         near.map(|&(_, kind)| TaskParam { kind, name, value })
     }
 
-    /// Whether `PROGRAM` begins an instance here and not, after a lost end, a declaration.
-    fn at_program_instance(&self) -> bool {
-        let ahead = if self.kind_at(2) == TokenKind::Ident && !self.word_at(2, "WITH") { 2 } else { 1 };
-        self.kind_at(ahead + 1) == TokenKind::Colon || self.word_at(ahead + 1, "WITH")
+    /// Whether `PROGRAM` begins an instance here and not, after a lost end, a declaration: that goes on with a variable
+    /// section or on a new line, an instance with `WITH` or `:`.
+    pub(super) fn at_program_instance(&self) -> bool {
+        /// More tokens than `PROGRAM RETAIN name WITH` with one too many.
+        const REACH: usize = 6;
+        let first = (1..REACH).find(|&ahead| self.kind_at(ahead) != TokenKind::Ident || self.word_at(ahead, "WITH"));
+        match first.map(|ahead| self.kind_at(ahead)) {
+            Some(TokenKind::Ident | TokenKind::Colon | TokenKind::Semicolon) => true,
+            // A doubled word.
+            Some(TokenKind::Keyword(Keyword::Program)) => first == Some(1),
+            _ => false,
+        }
     }
 
-    fn word_at(&self, ahead: usize, word: &str) -> bool {
+    pub(super) fn word_at(&self, ahead: usize, word: &str) -> bool {
         let token = self.token_at(ahead);
         let span = Span::new(self.file, token.start, token.end);
         token.kind == TokenKind::Ident && self.slice(span).eq_ignore_ascii_case(word)

@@ -366,9 +366,9 @@ fn wide_string(text: &str) -> Result<LiteralValue, Fault> {
 mod tests {
     use super::*;
 
-    fn int(value: Result<LiteralValue, Fault>) -> Option<u64> {
+    fn int(value: &Result<LiteralValue, Fault>) -> Option<u64> {
         match value {
-            Ok(LiteralValue::Int { magnitude, .. }) => Some(magnitude),
+            Ok(LiteralValue::Int { magnitude, .. }) => Some(*magnitude),
             _ => None,
         }
     }
@@ -393,17 +393,17 @@ mod tests {
 
     #[test]
     fn integers_of_all_bases() {
-        assert_eq!(int(integer("1_000", false)), Some(1000));
-        assert_eq!(int(integer("18446744073709551615", false)), Some(u64::MAX));
-        assert_eq!(int(integer("18446744073709551616", false)), None);
+        assert_eq!(int(&integer("1_000", false)), Some(1000));
+        assert_eq!(int(&integer("18446744073709551615", false)), Some(u64::MAX));
+        assert_eq!(int(&integer("18446744073709551616", false)), None);
         for wrong in ["1__0", "1_"] {
-            assert_eq!(int(integer(wrong, false)), None, "{wrong}");
+            assert_eq!(int(&integer(wrong, false)), None, "{wrong}");
         }
-        assert_eq!(int(based_integer("16#Ff_fF", false)), Some(0xFFFF));
-        assert_eq!(int(based_integer("2#1010", false)), Some(10));
-        assert_eq!(int(based_integer("8#17", false)), Some(15));
+        assert_eq!(int(&based_integer("16#Ff_fF", false)), Some(0xFFFF));
+        assert_eq!(int(&based_integer("2#1010", false)), Some(10));
+        assert_eq!(int(&based_integer("8#17", false)), Some(15));
         for wrong in ["16#", "16#G", "2#2", "3#1", "16#_1", "16#1FFFFFFFFFFFFFFFF"] {
-            assert_eq!(int(based_integer(wrong, false)), None, "{wrong}");
+            assert_eq!(int(&based_integer(wrong, false)), None, "{wrong}");
         }
     }
 

@@ -278,10 +278,12 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// Reports a syntax error at the current token, unless one has been reported there already.
+    /// Reports a syntax error at the current token, unless one has been reported there already: also one of the lexer,
+    /// about the token itself or about a string without end before it, which has swallowed what should stand here.
     fn report(&mut self, diagnostic: Diagnostic) {
-        let unknown = matches!(self.kind(), TokenKind::Unknown);
-        if self.reported_at != Some(self.pos) && !unknown {
+        let before = self.pos.checked_sub(1).and_then(|at| self.tokens.get(at)).map(|token| token.kind);
+        let known = self.at(TokenKind::Unknown) || before == Some(TokenKind::UnterminatedString);
+        if self.reported_at != Some(self.pos) && !known {
             self.push(diagnostic);
         }
         self.reported_at = Some(self.pos);

@@ -1,7 +1,7 @@
 //! The top level of a file and the program organisation units (IEC 61131-3 6.6).
 
 use super::Parser;
-use super::vars::section_kind;
+use super::vars::{DeclList, section_kind};
 use crate::diagnostics::{Diagnostic, syntax as rules};
 use crate::source::Span;
 use crate::syntax::ast::{Attribute, Declaration, Pou, PouKind, TypeSpec, VarKind, VarSection};
@@ -88,6 +88,8 @@ impl Parser<'_> {
             self.bump();
             match self.kind() {
                 TokenKind::End => return,
+                // A lost CONFIGURATION leaves its program instances behind.
+                TokenKind::Keyword(Keyword::Program) if self.at_program_instance() => {}
                 TokenKind::Keyword(word) if word.starts_declaration() || word == Keyword::VarGlobal => return,
                 _ => {}
             }
@@ -152,6 +154,7 @@ impl Parser<'_> {
                     Some(kind) => sections.push(self.var_section(word, kind, attributes)),
                     None => self.drop_misplaced_section(attributes),
                 },
+                None if self.headless_section() => sections.push(self.section_without_head(attributes)),
                 None => {
                     self.drop_attributes(attributes);
                     // `VAR_INPT` is a section whose word is misspelt, unless it is the beginning of a statement.
@@ -161,6 +164,32 @@ impl Parser<'_> {
                     }
                 }
             }
+        }
+    }
+
+    /// Whether declarations stand here whose `VAR` is missing: names with a `:`, and an `END_VAR` after them.
+    fn headless_section(&self) -> bool {
+        let declares = match self.kind_at(1) {
+            TokenKind::Comma => true,
+            TokenKind::Colon => self.kind_at(2) != TokenKind::Equal,
+            TokenKind::Ident => self.word_at(1, "AT") && self.kind_at(2) == TokenKind::Direct,
+            _ => false,
+        };
+        self.at(TokenKind::Ident) && declares && self.section_is_closed()
+    }
+
+    fn section_without_head(&mut self, attributes: Vec<Attribute>) -> VarSection {
+        let open = self.span();
+        self.report_missing("`VAR`", "what stands before these declarations");
+        let list = DeclList { end: Keyword::EndVar, opener: "VAR", open, closed: true };
+        let decls = self.declarations_until(&list);
+        VarSection {
+            kind: VarKind::Local,
+            constant: None,
+            retention: None,
+            decls,
+            attributes,
+            span: self.span_from(open),
         }
     }
 

@@ -186,7 +186,8 @@ impl Parser<'_> {
         let word_follows = self
             .keyword()
             .is_some_and(|word| word.starts_statement() || self.closes_open_block(word) || word.ends_pou());
-        if !word_follows && !(self.on_new_line() && self.at(TokenKind::Ident)) {
+        let next_follows = word_follows || (self.on_new_line() && self.at(TokenKind::Ident));
+        if !next_follows {
             self.skip_statement();
         }
     }

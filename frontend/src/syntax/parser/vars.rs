@@ -75,7 +75,7 @@ impl Parser<'_> {
                 }
                 Some((Retention::Persistent, _)) if found == Retention::Retain => {}
                 Some(_) => {
-                    self.report_at(&rules::BAD_QUALIFIER, span, "this contradicts or repeats the word before it")
+                    self.report_at(&rules::BAD_QUALIFIER, span, "this contradicts or repeats the word before it");
                 }
             }
         }
