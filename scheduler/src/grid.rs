@@ -70,40 +70,22 @@ mod tests {
 
     #[test]
     fn a_task_collected_late_loses_the_points_between_and_keeps_its_grid() {
-        assert_eq!(
-            collect(TimeNs(20), TEN, TimeNs(30)),
-            Step { next_due: TimeNs(40), lost_cycles: 1, overrun: false }
-        );
-        assert_eq!(
-            collect(TimeNs(23), TEN, TimeNs(79)),
-            Step { next_due: TimeNs(83), lost_cycles: 5, overrun: false }
-        );
+        assert_eq!(collect(TimeNs(20), TEN, TimeNs(30)), Step { next_due: TimeNs(40), lost_cycles: 1, overrun: false });
+        assert_eq!(collect(TimeNs(23), TEN, TimeNs(79)), Step { next_due: TimeNs(83), lost_cycles: 5, overrun: false });
     }
 
     #[test]
     fn the_three_policies_after_an_overrun() {
         let due = TimeNs(40);
         for policy in [OverrunPolicy::Grid, OverrunPolicy::AtOnce, OverrunPolicy::Realign] {
-            assert_eq!(
-                complete(due, TEN, TimeNs(40), policy),
-                Step { next_due: due, lost_cycles: 0, overrun: false }
-            );
+            assert_eq!(complete(due, TEN, TimeNs(40), policy), Step { next_due: due, lost_cycles: 0, overrun: false });
         }
         let late = |policy, end| complete(due, TEN, TimeNs(end), policy);
-        assert_eq!(
-            late(OverrunPolicy::Grid, 41),
-            Step { next_due: TimeNs(50), lost_cycles: 1, overrun: true }
-        );
+        assert_eq!(late(OverrunPolicy::Grid, 41), Step { next_due: TimeNs(50), lost_cycles: 1, overrun: true });
         // An end on a grid point has passed it.
-        assert_eq!(
-            late(OverrunPolicy::Grid, 50),
-            Step { next_due: TimeNs(60), lost_cycles: 2, overrun: true }
-        );
+        assert_eq!(late(OverrunPolicy::Grid, 50), Step { next_due: TimeNs(60), lost_cycles: 2, overrun: true });
         assert_eq!(late(OverrunPolicy::AtOnce, 65), Step { next_due: due, lost_cycles: 0, overrun: true });
-        assert_eq!(
-            late(OverrunPolicy::Realign, 65),
-            Step { next_due: TimeNs(75), lost_cycles: 3, overrun: true }
-        );
+        assert_eq!(late(OverrunPolicy::Realign, 65), Step { next_due: TimeNs(75), lost_cycles: 3, overrun: true });
     }
 
     #[test]

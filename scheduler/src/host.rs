@@ -206,8 +206,7 @@ mod tests {
         let allowed = sched_getaffinity(None).unwrap();
         let cpu = (0..CpuSet::MAX_CPU).find(|cpu| allowed.is_set(*cpu)).unwrap();
         let options = HostOptions { cpu: Some(cpu), ..HostOptions::default() };
-        let (report, used) =
-            on_scan_thread(&options, |report| (report, rustix::thread::sched_getcpu())).unwrap();
+        let (report, used) = on_scan_thread(&options, |report| (report, rustix::thread::sched_getcpu())).unwrap();
         assert!(report.first_refusal().is_none(), "{report:?}");
         assert_eq!(used, cpu);
     }

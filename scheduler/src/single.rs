@@ -11,7 +11,10 @@ use crate::task::{TaskIndex, TaskSet};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Place {
     /// TRUE when the masked byte is not 0.
-    Byte { offset: usize, mask: u8 },
+    Byte {
+        offset: usize,
+        mask: u8,
+    },
     Literal(bool),
 }
 
@@ -29,7 +32,8 @@ impl SingleTable {
     pub fn new(tasks: &TaskSet, layout: &ImageLayout) -> Self {
         let mut table = SingleTable::default();
         for task in tasks.indices() {
-            let byte = |start: u32, offset: u32, mask| Place::Byte { offset: start.saturating_add(offset) as usize, mask };
+            let byte =
+                |start: u32, offset: u32, mask| Place::Byte { offset: start.saturating_add(offset) as usize, mask };
             let place = match tasks.info(task).single {
                 SingleSource::None => continue,
                 SingleSource::Slot(slot) => byte(layout.slots.start, u32::from(slot.0) * SLOT_BYTES, 0xff),

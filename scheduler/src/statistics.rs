@@ -317,13 +317,8 @@ mod tests {
 
     fn report(statistics: &TaskStatistics) -> TaskReport {
         let trigger = Trigger::Cyclic { interval: DurationNs(5000), gated: false, policy: OverrunPolicy::Grid };
-        let state = TaskState {
-            trigger,
-            priority: Priority(3),
-            enabled: true,
-            next_due: TimeNs::ZERO,
-            single_previous: false,
-        };
+        let state =
+            TaskState { trigger, priority: Priority(3), enabled: true, next_due: TimeNs::ZERO, single_previous: false };
         let info = TaskInfo {
             id: 9,
             phase: TimeNs::ZERO,

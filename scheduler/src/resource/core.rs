@@ -4,9 +4,11 @@ use std::fmt;
 use std::sync::Arc;
 
 use khz_bytecode::container::{RetainRange, SystemVariable, SystemVariableKind};
+use khz_bytecode::ids::FunctionId;
 use khz_bytecode::limits::{SLOT_BYTES, STARTUP_WATCHDOG_US};
 use khz_machine::engine::{Engine, Entry, Fuel, Limits};
 use khz_machine::image::{Image, ImageLayout};
+use khz_machine::trap::{CodePlace, Trap, TrapCode};
 
 use super::cycle::Watch;
 use super::{HoldsContainer, LoadError, LoadOptions, ResetKind};
@@ -70,8 +72,7 @@ impl Core {
         let image = Image::new(ImageLayout::new(container, options.max_image_bytes)?, container);
         let tasks = TaskSet::new(container);
         let default_watchdog = DurationNs::from_us(options.watchdog_us);
-        let watches: Vec<Watch> =
-            tasks.indices().map(|task| Watch::new(tasks.info(task), default_watchdog)).collect();
+        let watches: Vec<Watch> = tasks.indices().map(|task| Watch::new(tasks.info(task), default_watchdog)).collect();
         let startup_watchdog = match default_watchdog {
             DurationNs(0) => DurationNs::from_us(STARTUP_WATCHDOG_US),
             given => given,
@@ -115,7 +116,7 @@ impl Core {
     /// Runs the init function, if there is one.
     pub fn initialise(&mut self) -> Result<(), Box<FaultReport>> {
         match self.program.container().parameters.init_function {
-            Some(_) => self.run_once(Entry::Init, FaultPlace::Init),
+            Some(function) => self.run_once(Entry::Init, function, FaultPlace::Init),
             None => Ok(()),
         }
     }
@@ -123,8 +124,8 @@ impl Core {
     /// Runs the startup function, if there is one, and lets time go on.
     pub fn start(&mut self) -> Result<(), Box<FaultReport>> {
         self.guard.clear();
-        if self.program.container().parameters.startup_function.is_some() {
-            self.run_once(Entry::Startup, FaultPlace::Startup)?;
+        if let Some(function) = self.program.container().parameters.startup_function {
+            self.run_once(Entry::Startup, function, FaultPlace::Startup)?;
         }
         self.clock.start_at(self.time);
         Ok(())
@@ -168,8 +169,8 @@ impl Core {
         self.image.bytes_mut().get_mut(start..end).unwrap_or_default()
     }
 
-    /// Runs init or startup function under its watchdog.
-    fn run_once(&mut self, entry: Entry, place: FaultPlace) -> Result<(), Box<FaultReport>> {
+    /// Runs init or startup function, which is `function`, under its watchdog.
+    fn run_once(&mut self, entry: Entry, function: FunctionId, place: FaultPlace) -> Result<(), Box<FaultReport>> {
         let limit = self.startup_watchdog;
         self.clock.start_at(self.time);
         let mut fuel = Fuel { left: limit.0 };
@@ -182,11 +183,11 @@ impl Core {
             fuel: if deadline.is_none() { Some(&mut fuel) } else { None },
             task_index: 0,
         };
-        let outcome = self.engine.run(entry, &mut self.image, limits);
+        let mut outcome = self.engine.run(entry, &mut self.image, limits);
         let expired = self.guard.disarm();
-        if expired && outcome.is_ok() {
-            // It ended by itself while the deadline passed: late, but whole, and nothing waits for it yet.
-            self.guard.clear();
+        if outcome.is_ok() && (expired || self.clock.now() > self.time.after(limit)) {
+            // It ended by itself, but too late: no instruction is to blame more than another.
+            outcome = Err(Trap::new(TrapCode::Watchdog, CodePlace { function, offset: 0 }, [0; 3]));
         }
         outcome.map_err(|trap| Box::new(FaultReport { place, trap, time: self.time, rounds: self.rounds }))
     }

@@ -77,11 +77,8 @@ impl Cycle<'_> {
     #[inline]
     fn run_instances(&mut self) -> Result<(), InstanceTrap> {
         for &instance in self.instances {
-            let limits = Limits {
-                deadline: self.guard.cell(),
-                fuel: self.fuel.as_deref_mut(),
-                task_index: self.task.index(),
-            };
+            let limits =
+                Limits { deadline: self.guard.cell(), fuel: self.fuel.as_deref_mut(), task_index: self.task.index() };
             self.engine
                 .run(Entry::Instance(instance), self.image, limits)
                 .map_err(|trap| InstanceTrap { instance, trap })?;
@@ -129,8 +126,7 @@ mod tests {
     fn sensitivity_counts_consecutive_late_cycles() {
         let mut watch = watch(100, 3, 0);
         assert_eq!(watch.limit, DurationNs(300));
-        let trips: Vec<bool> =
-            [150, 150, 100, 150, 150, 150].map(|used| watch.trips_after(DurationNs(used))).to_vec();
+        let trips: Vec<bool> = [150, 150, 100, 150, 150, 150].map(|used| watch.trips_after(DurationNs(used))).to_vec();
         assert_eq!(trips, [false, false, false, false, false, true]);
     }
 

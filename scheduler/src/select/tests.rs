@@ -174,11 +174,7 @@ fn decisions_agree_with_a_brute_force_model() {
                 if let Trigger::Cyclic { interval, policy, .. } = state.trigger {
                     let step = grid::complete(state.next_due, interval, TimeNs(now), policy);
                     state.next_due = step.next_due;
-                    assert_eq!(
-                        (step.overrun, step.lost_cycles),
-                        model[task.index()].end(now),
-                        "seed {seed} at {now}"
-                    );
+                    assert_eq!((step.overrun, step.lost_cycles), model[task.index()].end(now), "seed {seed} at {now}");
                 }
             }
             now += numbers.below(12);
