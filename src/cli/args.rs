@@ -1,0 +1,289 @@
+//! The command line's words: what scripts may rely on. One struct a subcommand.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+/// Structured Text to verified containers, run natively under a scheduler that measures every cycle.
+#[derive(Debug, Parser)]
+#[command(name = "khz", version, arg_required_else_help = true)]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// The subcommands.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Parse and analyse; report every diagnostic
+    Check(CheckArgs),
+    /// Say what a diagnostic, verifier rule or trap means
+    Explain(ExplainArgs),
+    /// Compile to a container for each RESOURCE
+    Build(BuildArgs),
+    /// Verify a container and say what was proved
+    Verify(VerifyArgs),
+    /// Show bytecode, mid-level form, Cranelift IR or machine code beside its source
+    Disasm(DisasmArgs),
+    /// Run a program under the scheduler
+    Run(RunArgs),
+    /// Measure the time of a scan
+    Bench(BenchArgs),
+    /// Run both engines in lock-step and report the first difference
+    Diff(DiffArgs),
+}
+
+/// How results are printed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Format {
+    /// For people.
+    Human,
+    /// For programs: one JSON value on stdout.
+    Json,
+}
+
+/// What every subcommand takes.
+#[derive(Debug, Clone, Args)]
+pub struct Common {
+    /// How results are printed
+    #[arg(long, value_enum, default_value = "human")]
+    pub format: Format,
+}
+
+/// Which rules of the language hold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum DialectArg {
+    /// The standard's implicit conversions only.
+    Iec,
+    /// What vendor code does is accepted, with warnings.
+    Default,
+}
+
+/// Files, and how they are compiled.
+#[derive(Debug, Clone, Args)]
+pub struct Sources {
+    /// Structured Text files, a folder of them, or one container (.iplc)
+    #[arg(required = true, value_name = "FILE")]
+    pub files: Vec<PathBuf>,
+    /// Which rules of the language hold
+    #[arg(long, value_enum, default_value = "default")]
+    pub dialect: DialectArg,
+}
+
+/// `khz check`.
+#[derive(Debug, Args)]
+pub struct CheckArgs {
+    #[command(flatten)]
+    #[allow(missing_docs, reason = "clap would show it as help of the group")]
+    pub sources: Sources,
+    #[command(flatten)]
+    #[allow(missing_docs, reason = "clap would show it as help of the group")]
+    pub common: Common,
+}
+
+/// `khz explain`.
+#[derive(Debug, Args)]
+pub struct ExplainArgs {
+    /// A code such as S0012, V0007 or C0003, or a trap's name; without one, the list of all
+    pub code: Option<String>,
+    #[command(flatten)]
+    #[allow(missing_docs, reason = "clap would show it as help of the group")]
+    pub common: Common,
+}
+
+/// `khz build`.
+#[derive(Debug, Args)]
+pub struct BuildArgs {
+    #[command(flatten)]
+    #[allow(missing_docs, reason = "clap would show it as help of the group")]
+    pub sources: Sources,
+    /// Where the container goes; several RESOURCEs give OUT.<resource>.iplc each
+    #[arg(short, long, value_name = "OUT.iplc")]
+    pub output: PathBuf,
+    /// Leave the debug section out
+    #[arg(long)]
+    pub strip: bool,
+    #[command(flatten)]
+    #[allow(missing_docs, reason = "clap would show it as help of the group")]
+    pub common: Common,
+}
+
+/// `khz verify`.
+#[derive(Debug, Args)]
+pub struct VerifyArgs {
+    #[command(flatten)]
+    #[allow(missing_docs, reason = "clap would show it as help of the group")]
+    pub sources: Sources,
+    #[command(flatten)]
+    #[allow(missing_docs, reason = "clap would show it as help of the group")]
+    pub common: Common,
+}
+
+/// `khz disasm`.
+#[derive(Debug, Args)]
+pub struct DisasmArgs {
+    #[command(flatten)]
+    #[allow(missing_docs, reason = "clap would show it as help of the group")]
+    pub sources: Sources,
+    /// The JIT's mid-level form, after its passes
+    #[arg(long, group = "form")]
+    pub mir: bool,
+    /// Cranelift's intermediate representation
+    #[arg(long, group = "form")]
+    pub clif: bool,
+    /// Machine code
+    #[arg(long, group = "form")]
+    pub asm: bool,
+    /// Which RESOURCE, when there are several
+    #[arg(long, value_name = "NAME")]
+    pub resource: Option<String>,
+    #[command(flatten)]
+    #[allow(missing_docs, reason = "clap would show it as help of the group")]
+    pub common: Common,
+}
+
+/// Which engine runs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum EngineArg {
+    /// Native code.
+    Jit,
+    /// The interpreter.
+    Interp,
+}
+
+/// Which engines are measured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum EnginesArg {
+    /// Native code.
+    Jit,
+    /// The interpreter.
+    Interp,
+    /// One after the other.
+    Both,
+}
+
+/// What drives the scheduler.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum ClockArg {
+    /// The machine's monotonic clock.
+    Real,
+    /// A clock that only moves between rounds: every run is the same.
+    Virtual,
+}
+
+/// What a running resource is given.
+#[derive(Debug, Clone, Args)]
+pub struct ResourceArgs {
+    /// Which RESOURCE, when there are several
+    #[arg(long, value_name = "NAME")]
+    pub resource: Option<String>,
+    /// A variable's value before the first scan
+    #[arg(long = "set", value_name = "NAME=VALUE")]
+    pub set: Vec<String>,
+    /// Values over time: first column time_us, then a column for each variable or address
+    #[arg(long, value_name = "CSV")]
+    pub inputs: Option<PathBuf>,
+    /// Watchdog for tasks that set none, in microseconds; 0: none
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub watchdog_us: u64,
+    /// Largest memory image, in bytes
+    #[arg(long, value_name = "BYTES", default_value_t = khz_bytecode::limits::MAX_IMAGE_BYTES)]
+    pub max_image: u64,
+}
+
+/// `khz run`.
+#[derive(Debug, Args)]
+pub struct RunArgs {
+    #[command(flatten)]
+    #[allow(missing_docs, reason = "clap would show it as help of the group")]
+    pub sources: Sources,
+    /// Which engine runs
+    #[arg(long, value_enum, default_value = "jit")]
+    pub engine: EngineArg,
+    /// End after N rounds in which a task ran
+    #[arg(long, value_name = "N")]
+    pub scans: Option<u64>,
+    /// Run until stopped (the default without --scans)
+    #[arg(long, conflicts_with = "scans")]
+    pub continuous: bool,
+    /// What drives the scheduler
+    #[arg(long, value_enum, default_value = "real")]
+    pub clock: ClockArg,
+    #[command(flatten)]
+    #[allow(missing_docs, reason = "clap would show it as help of the group")]
+    pub resource: ResourceArgs,
+    /// All variables at the end, also after a trap: .json, or any other ending for text
+    #[arg(long, value_name = "PATH")]
+    pub dump_vars: Option<PathBuf>,
+    /// One row a round with the watched variables
+    #[arg(long, value_name = "CSV", requires = "watch")]
+    pub trace: Option<PathBuf>,
+    /// Variables of the trace
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',', requires = "trace")]
+    pub watch: Vec<String>,
+    /// Task statistics at the end, as JSON
+    #[arg(long, value_name = "PATH")]
+    pub stats: Option<PathBuf>,
+    /// Real-time priority (SCHED_FIFO, 1 to 98)
+    #[arg(long, value_name = "PRIO", value_parser = clap::value_parser!(u8).range(1..=98))]
+    pub rt: Option<u8>,
+    /// Processor to run on
+    #[arg(long, value_name = "N")]
+    pub cpu: Option<u32>,
+    /// Spin for the last microseconds of a wait
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub spin_us: u64,
+    #[command(flatten)]
+    #[allow(missing_docs, reason = "clap would show it as help of the group")]
+    pub common: Common,
+}
+
+/// `khz bench`.
+#[derive(Debug, Args)]
+pub struct BenchArgs {
+    #[command(flatten)]
+    #[allow(missing_docs, reason = "clap would show it as help of the group")]
+    pub sources: Sources,
+    /// Which engines are measured
+    #[arg(long, value_enum, default_value = "both")]
+    pub engine: EnginesArg,
+    /// Scans to time; without it, until the median is stable
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    pub scans: Option<u64>,
+    #[command(flatten)]
+    #[allow(missing_docs, reason = "clap would show it as help of the group")]
+    pub resource: ResourceArgs,
+    /// Figures as a JSON array, one object an engine
+    #[arg(long, value_name = "PATH")]
+    pub json: Option<PathBuf>,
+    /// Figures as one self-contained HTML page
+    #[arg(long, value_name = "OUT.html")]
+    pub report: Option<PathBuf>,
+    /// Measure start latency per task on the real clock instead
+    #[arg(long)]
+    pub jitter: bool,
+    /// How long to measure jitter, in seconds
+    #[arg(long, value_name = "S", default_value_t = 10, requires = "jitter")]
+    pub duration: u64,
+    #[command(flatten)]
+    #[allow(missing_docs, reason = "clap would show it as help of the group")]
+    pub common: Common,
+}
+
+/// `khz diff`.
+#[derive(Debug, Args)]
+pub struct DiffArgs {
+    #[command(flatten)]
+    #[allow(missing_docs, reason = "clap would show it as help of the group")]
+    pub sources: Sources,
+    /// Rounds to compare
+    #[arg(long, value_name = "N", default_value_t = 1000)]
+    pub scans: u64,
+    #[command(flatten)]
+    #[allow(missing_docs, reason = "clap would show it as help of the group")]
+    pub resource: ResourceArgs,
+    #[command(flatten)]
+    #[allow(missing_docs, reason = "clap would show it as help of the group")]
+    pub common: Common,
+}

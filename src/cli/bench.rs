@@ -1,0 +1,202 @@
+//! `khz bench`: the time of a scan, in batches; or start latency per task on the real clock.
+
+mod html;
+mod measure;
+
+use std::time::Duration;
+
+use khz_scheduler::time::DurationNs;
+use khz_scheduler::{
+    Hooks, HostOptions, MonotonicClock, NoInputs, NoIo, NoObserver, RunOptions, RunOutcome, StatisticsReport, StopHandle, on_scan_thread,
+    run as run_rounds, stop_on_signals,
+};
+use kilohertz::files::{self, Input};
+use kilohertz::pipeline::EngineKind;
+use serde_json::{Value, json};
+
+use super::args::{BenchArgs, EnginesArg, Format};
+use super::output::{Failure, choose, compile_options, load, people, result, write_file};
+use super::report::{FaultContext, report_fault};
+use super::session::{Opened, Session};
+use super::stopwatch::Stopwatch;
+use super::{Outcome, Status};
+use measure::{Distribution, Measured};
+
+/// Figures of one engine.
+pub struct Figures {
+    /// `jit` or `interp`.
+    pub engine: &'static str,
+    /// Scans and their times.
+    pub measured: Measured,
+    /// Nanoseconds for sources to container, verification, container to engine.
+    pub compile_ns: [u64; 3],
+    /// Bytes of the container.
+    pub container_bytes: usize,
+    /// Bytes of the engine's code.
+    pub code_bytes: usize,
+}
+
+/// Runs it.
+pub fn run(args: &BenchArgs) -> Outcome {
+    let frontend_ns = frontend_ns(args)?;
+    let program = choose(load(&args.sources)?, args.resource.resource.as_deref())?;
+    let session = Session::new(program, &args.resource);
+    let host = HostOptions::default();
+    if args.jitter {
+        let outcome = on_scan_thread(&host, |_| jitter(args, &session));
+        return outcome.map_err(|error| Failure::Message(Status::Host, format!("no thread to scan on: {error}")))?;
+    }
+    let kinds: &[EngineKind] = match args.engine {
+        EnginesArg::Jit => &[EngineKind::Jit],
+        EnginesArg::Interp => &[EngineKind::Interp],
+        EnginesArg::Both => &[EngineKind::Jit, EngineKind::Interp],
+    };
+    let mut all = Vec::new();
+    for kind in kinds {
+        let measured = on_scan_thread(&host, |_| bench_engine(args, &session, *kind, frontend_ns));
+        match measured.map_err(|error| Failure::Message(Status::Host, format!("no thread to scan on: {error}")))?? {
+            Some(figures) => all.push(figures),
+            None => return Ok(Status::Trap),
+        }
+    }
+    print(args, &all)
+}
+
+/// Time from source text to container; 0 for a container file.
+fn frontend_ns(args: &BenchArgs) -> Result<u64, Failure> {
+    let Input::Sources(sources) = files::read(&args.sources.files)? else { return Ok(0) };
+    let options = compile_options(&args.sources);
+    let watch = Stopwatch::start();
+    let compilation = khz_frontend::compile(&sources, &options);
+    let ns = watch.ns();
+    drop(compilation);
+    Ok(ns)
+}
+
+/// Figures of one engine, or none after a trap, which was reported.
+fn bench_engine(args: &BenchArgs, session: &Session<'_>, kind: EngineKind, frontend_ns: u64) -> Result<Option<Figures>, Failure> {
+    let container = session.program.container().clone();
+    let watch = Stopwatch::start();
+    khz_bytecode::verify::verify(container).map_err(Failure::refused)?;
+    let verify_ns = watch.ns();
+    let layout = session.program.layout(args.resource.max_image).map_err(Failure::refused)?;
+    let watch = Stopwatch::start();
+    let engine = session.program.engine(kind, &layout, false).map_err(Failure::refused)?;
+    let engine_ns = watch.ns();
+    let (name, code_bytes) = (engine.name(), engine.code_bytes());
+    drop(engine);
+    // The monotonic clock arms real deadlines, as in production; the resource's own time moves on by the interval each scan.
+    let clock = Box::new(MonotonicClock::new(DurationNs(0)));
+    let faulted = match session.open(kind, clock, false, None, None)? {
+        Opened::Faulted(faulted) => *faulted,
+        Opened::Ready(resource) => match resource.start() {
+            Err(faulted) => faulted,
+            Ok(running) => match measure::measure(running, args.scans) {
+                Ok(measured) => {
+                    let compile_ns = [frontend_ns, verify_ns, engine_ns];
+                    let container_bytes = session.program.container_bytes;
+                    return Ok(Some(Figures { engine: name, measured, compile_ns, container_bytes, code_bytes }));
+                }
+                Err(faulted) => faulted,
+            },
+        },
+    };
+    let context = FaultContext { container: session.program.container() };
+    report_fault(faulted.report(), &context, args.common.format);
+    Ok(None)
+}
+
+fn print(args: &BenchArgs, all: &[Figures]) -> Outcome {
+    let file = args.sources.files.iter().map(|f| f.display().to_string()).collect::<Vec<_>>().join(" ");
+    let rows = Value::Array(all.iter().map(|figures| figures_json(&file, figures)).collect());
+    if let Some(path) = &args.json {
+        write_file(path, rows.to_string().as_bytes())?;
+    }
+    if let Some(path) = &args.report {
+        write_file(path, html::page(&file, all).as_bytes())?;
+    }
+    if args.common.format == Format::Json {
+        result(&rows.to_string());
+        return Ok(Status::Done);
+    }
+    for figures in all {
+        let Distribution { min, median, p99, p999, max, .. } = figures.measured.distribution;
+        people(&format!(
+            "{:<7} {median:.1} ns a scan (median of {} scans; min {min:.1}, p99 {p99:.1}, p99.9 {p999:.1}, max {max:.1})",
+            figures.engine, figures.measured.scans
+        ));
+        let [frontend, verify, engine] = figures.compile_ns.map(|ns| ns as f64 / 1e6);
+        people(&format!(
+            "        compiled in {frontend:.2} ms + verified in {verify:.2} ms + made ready in {engine:.2} ms; container {} bytes, code {} bytes",
+            figures.container_bytes, figures.code_bytes
+        ));
+    }
+    Ok(Status::Done)
+}
+
+fn figures_json(file: &str, figures: &Figures) -> Value {
+    let Distribution { min, median, p99, p999, max, mean } = figures.measured.distribution;
+    let [frontend, verify, engine] = figures.compile_ns;
+    json!({
+        "file": file, "engine": figures.engine, "scans": figures.measured.scans,
+        "ns_per_scan": { "min": min, "median": median, "p99": p99, "p999": p999, "max": max, "mean": mean },
+        "compile_ns": { "frontend": frontend, "verify": verify, "engine": engine },
+        "container_bytes": figures.container_bytes, "code_bytes": figures.code_bytes,
+    })
+}
+
+/// Runs on the real clock for `--duration` and reports how late each task started.
+fn jitter(args: &BenchArgs, session: &Session<'_>) -> Outcome {
+    let kind = if args.engine == EnginesArg::Interp { EngineKind::Interp } else { EngineKind::Jit };
+    let stop = StopHandle::new();
+    stop_on_signals(&stop).map_err(|error| Failure::Message(Status::Host, format!("signal handlers: {error}")))?;
+    let clock = Box::new(MonotonicClock::new(DurationNs(0)));
+    let Opened::Ready(resource) = session.open(kind, clock, false, Some(stop.clone()), None)? else {
+        return Err(Failure::Message(Status::Trap, "the initialisation trapped; `khz run` reports where".into()));
+    };
+    let mut rows = session.inputs(resource.image())?;
+    let mut no_rows = NoInputs;
+    let running = resource.start().map_err(|f| Failure::Message(Status::Trap, format!("startup: {}", f.report().trap.code)))?;
+    let duration = Duration::from_secs(args.duration);
+    std::thread::spawn(move || {
+        std::thread::sleep(duration);
+        stop.request();
+    });
+    let (mut io, mut observer) = (NoIo, NoObserver);
+    let mut hooks = Hooks { io: &mut io, inputs: rows.as_mut().map_or(&mut no_rows as _, |rows| rows as _), observer: &mut observer };
+    let statistics = match run_rounds(running, &mut hooks, RunOptions { scans: args.scans }) {
+        RunOutcome::Completed(resource) | RunOutcome::NothingDue(resource) | RunOutcome::Stopped(resource) => resource.statistics(),
+        RunOutcome::Faulted(faulted) => {
+            let context = FaultContext { container: session.program.container() };
+            report_fault(faulted.report(), &context, args.common.format);
+            return Ok(Status::Trap);
+        }
+    };
+    print_jitter(args, session, &statistics)
+}
+
+fn print_jitter(args: &BenchArgs, session: &Session<'_>, statistics: &StatisticsReport) -> Outcome {
+    let names = session.program.container().debug.as_ref().map(|debug| debug.task_names.clone()).unwrap_or_default();
+    let text = statistics.to_json(&names);
+    if let Some(path) = &args.json {
+        write_file(path, text.as_bytes())?;
+    }
+    if let Some(path) = &args.report {
+        write_file(path, html::jitter_page(statistics, &names).as_bytes())?;
+    }
+    if args.common.format == Format::Json {
+        result(&text);
+    }
+    for (position, task) in statistics.tasks.iter().enumerate() {
+        let name = names.get(position).cloned().unwrap_or_else(|| format!("task {}", task.id));
+        if let Some(late) = &task.jitter {
+            let [median, p99, p999] = [late.median, late.p99, late.p999].map(Option::unwrap_or_default);
+            people(&format!(
+                "{name}: {} starts, late by {} / {median} / {p99} / {p999} / {} ns (min, median, p99, p99.9, max)",
+                late.count, late.min, late.max
+            ));
+        }
+    }
+    Ok(Status::Done)
+}
+

@@ -1,0 +1,26 @@
+//! `khz check`: parse and analyse; every diagnostic of the run.
+
+use kilohertz::files;
+use kilohertz::files::Input;
+use khz_frontend::diagnostics::{Severity, has_errors};
+
+use super::args::{CheckArgs, Format};
+use super::output::{compile_options, people, print_diagnostics, load};
+use super::{Outcome, Status};
+
+/// Runs it.
+pub fn run(args: &CheckArgs) -> Outcome {
+    let input = files::read(&args.sources.files)?;
+    let Input::Sources(sources) = input else {
+        // A container has no source to complain about: checking it is verifying it.
+        load(&args.sources)?;
+        return Ok(Status::Done);
+    };
+    let checked = khz_frontend::check(&sources, &compile_options(&args.sources));
+    print_diagnostics(&checked.diagnostics, &checked.sources, args.common.format);
+    if args.common.format == Format::Human {
+        let count = |severity| checked.diagnostics.iter().filter(|d| d.severity == severity).count();
+        people(&format!("{} errors, {} warnings", count(Severity::Error), count(Severity::Warning)));
+    }
+    Ok(if has_errors(&checked.diagnostics) { Status::Refused } else { Status::Done })
+}

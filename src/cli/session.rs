@@ -1,0 +1,78 @@
+//! What `run`, `bench` and `diff` share: from arguments to a loaded resource.
+
+use std::sync::Arc;
+
+use kilohertz::pipeline::{EngineKind, Program};
+use khz_machine::image::Image;
+use khz_machine::variables::VariableTable;
+use khz_scheduler::{Clock, Faulted, HoldsContainer, LoadError, LoadOptions, Resource, StopHandle, Stopped, VirtualClock};
+
+use super::args::ResourceArgs;
+use super::inputs::{CsvInputs, set_values};
+use super::output::Failure;
+use super::Status;
+
+/// A program and what the command line gives it.
+pub struct Session<'a> {
+    /// The program.
+    pub program: Program,
+    /// Its variables by name.
+    pub names: VariableTable,
+    /// What it is given.
+    pub args: &'a ResourceArgs,
+}
+
+/// A resource that is ready to start, or one that trapped in its initialisation.
+pub enum Opened {
+    /// Ready.
+    Ready(Resource<Stopped>),
+    /// The init function trapped.
+    Faulted(Box<Resource<Faulted>>),
+}
+
+impl<'a> Session<'a> {
+    /// A session of one program.
+    pub fn new(program: Program, args: &'a ResourceArgs) -> Self {
+        let names = VariableTable::of(program.container());
+        Session { program, names, args }
+    }
+
+    /// Whether code charges fuel on the virtual clock: some task has a watchdog, or code runs before the first round.
+    pub fn needs_fuel(&self) -> bool {
+        let container = self.program.container();
+        let has_watchdog = self.args.watchdog_us > 0 || container.tasks.tasks.iter().any(|task| task.watchdog_us > 0);
+        let starts_with_code = container.parameters.init_function.is_some() || container.parameters.startup_function.is_some();
+        has_watchdog || starts_with_code
+    }
+
+    /// Loads the resource with an engine and a clock, and applies `--set`.
+    pub fn open(&self, kind: EngineKind, clock: Box<dyn Clock>, fuel: bool, stop: Option<StopHandle>, rt: Option<u8>) -> Result<Opened, Failure> {
+        let layout = self.program.layout(self.args.max_image).map_err(Failure::refused)?;
+        let engine = self.program.engine(kind, &layout, fuel).map_err(Failure::refused)?;
+        let options = LoadOptions {
+            max_image_bytes: self.args.max_image,
+            watchdog_us: self.args.watchdog_us,
+            stop,
+            real_time_priority: rt,
+        };
+        let holder: Arc<dyn HoldsContainer> = self.program.verified.clone();
+        let mut resource = match Resource::load(holder, engine, clock, &options) {
+            Ok(resource) => resource,
+            Err(LoadError::Faulted(faulted)) => return Ok(Opened::Faulted(faulted)),
+            Err(LoadError::Image(error)) => return Err(Failure::refused(error)),
+            Err(error) => return Err(Failure::Message(Status::Host, error.to_string())),
+        };
+        set_values(&self.names, resource.image_mut(), &self.args.set)?;
+        Ok(Opened::Ready(resource))
+    }
+
+    /// Loads the resource on a virtual clock of its own.
+    pub fn open_virtual(&self, kind: EngineKind, fuel: bool) -> Result<Opened, Failure> {
+        self.open(kind, Box::new(VirtualClock::new()), fuel, None, None)
+    }
+
+    /// The rows of `--inputs`, checked against the image.
+    pub fn inputs(&self, image: &Image) -> Result<Option<CsvInputs>, Failure> {
+        self.args.inputs.as_ref().map(|path| CsvInputs::read(path, &self.names, image)).transpose()
+    }
+}

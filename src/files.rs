@@ -1,0 +1,158 @@
+//! Reading what a user names on the command line: source files, folders of them, or one container.
+
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+
+use khz_frontend::SourceInput;
+
+/// Largest source or container file that is read, in bytes.
+pub const MAX_FILE_BYTES: u64 = 1 << 30;
+/// Endings of source files that are picked up from a folder.
+const SOURCE_ENDINGS: [&str; 2] = ["st", "iecst"];
+/// First bytes of every container.
+const CONTAINER_MAGIC: [u8; 4] = 0x4950_4C43_u32.to_le_bytes();
+
+/// What the command line named.
+#[derive(Debug)]
+pub enum Input {
+    /// Sources, in the order given; those of a folder by path.
+    Sources(Vec<SourceInput>),
+    /// One container and its file's name.
+    Container(String, Vec<u8>),
+}
+
+/// Why a file could not be taken.
+#[derive(Debug, thiserror::Error)]
+pub enum FileError {
+    /// The system refused it.
+    #[error("{path}: {reason}")]
+    Refused {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        reason: std::io::Error,
+    },
+    /// It is larger than [`MAX_FILE_BYTES`].
+    #[error("{path}: {bytes} bytes are more than the {MAX_FILE_BYTES} that a file may have")]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+        /// Its size.
+        bytes: u64,
+    },
+    /// It is empty.
+    #[error("{0}: the file is empty")]
+    Empty(PathBuf),
+    /// A folder without sources.
+    #[error("{0}: no Structured Text file (.st) in this folder")]
+    NoSources(PathBuf),
+    /// A container among other files.
+    #[error("{0}: a container is run by itself, not together with other files")]
+    ContainerAmongOthers(PathBuf),
+}
+
+/// Reads everything that `paths` name.
+///
+/// # Errors
+/// The first file that can not be taken.
+pub fn read(paths: &[PathBuf]) -> Result<Input, FileError> {
+    let mut files = Vec::new();
+    for path in paths {
+        if path.is_dir() {
+            let before = files.len();
+            collect_folder(path, &mut files)?;
+            if files.len() == before {
+                return Err(FileError::NoSources(path.clone()));
+            }
+        } else {
+            files.push(path.clone());
+        }
+    }
+    let mut sources = Vec::new();
+    for path in &files {
+        let bytes = read_file(path)?;
+        if bytes.starts_with(&CONTAINER_MAGIC) || path.extension().is_some_and(|e| e.eq_ignore_ascii_case("iplc")) {
+            if files.len() > 1 {
+                return Err(FileError::ContainerAmongOthers(path.clone()));
+            }
+            return Ok(Input::Container(path.display().to_string(), bytes));
+        }
+        sources.push(SourceInput { name: path.display().to_string(), bytes });
+    }
+    Ok(Input::Sources(sources))
+}
+
+/// Reads one file whole.
+///
+/// # Errors
+/// When it is missing, unreadable, empty or too large.
+pub fn read_file(path: &Path) -> Result<Vec<u8>, FileError> {
+    let refused = |reason| FileError::Refused { path: path.to_path_buf(), reason };
+    let file = File::open(path).map_err(refused)?;
+    let metadata = file.metadata().map_err(refused)?;
+    if metadata.is_file() && metadata.len() == 0 {
+        return Err(FileError::Empty(path.to_path_buf()));
+    }
+    if metadata.len() > MAX_FILE_BYTES {
+        return Err(FileError::TooLarge { path: path.to_path_buf(), bytes: metadata.len() });
+    }
+    if !metadata.is_file() {
+        // A pipe or device can not be mapped and has no size: it is read up to the limit.
+        let mut bytes = Vec::new();
+        std::io::Read::read_to_end(&mut std::io::Read::take(file, MAX_FILE_BYTES), &mut bytes).map_err(refused)?;
+        return if bytes.is_empty() { Err(FileError::Empty(path.to_path_buf())) } else { Ok(bytes) };
+    }
+    // SAFETY: the mapping is only read, copied out at once, and dropped before this function returns. Should another process cut
+    // the file off in between, the copy ends in SIGBUS like any read of a vanished mapping; no memory of ours is touched.
+    let mapping = unsafe { memmap2::Mmap::map(&file) }.map_err(refused)?;
+    Ok(mapping.to_vec())
+}
+
+fn collect_folder(folder: &Path, files: &mut Vec<PathBuf>) -> Result<(), FileError> {
+    // A work list instead of recursion: folders may be nested deeply. Links are not followed, so it ends.
+    let mut folders = vec![folder.to_path_buf()];
+    let mut found = Vec::new();
+    while let Some(folder) = folders.pop() {
+        let refused = |reason| FileError::Refused { path: folder.clone(), reason };
+        for entry in fs::read_dir(&folder).map_err(refused)? {
+            let entry = entry.map_err(refused)?;
+            let kind = entry.file_type().map_err(refused)?;
+            let path = entry.path();
+            let is_source = path.extension().and_then(|e| e.to_str()).is_some_and(|e| SOURCE_ENDINGS.iter().any(|s| e.eq_ignore_ascii_case(s)));
+            if kind.is_dir() && !entry.file_name().to_string_lossy().starts_with('.') {
+                folders.push(path);
+            } else if is_source {
+                found.push(path);
+            }
+        }
+    }
+    found.sort();
+    files.append(&mut found);
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_missing_file_is_named() {
+        let error = read(&[PathBuf::from("/nowhere/plant.st")]).unwrap_err();
+        assert!(error.to_string().starts_with("/nowhere/plant.st: "), "{error}");
+    }
+
+    #[test]
+    fn a_folder_gives_its_sources_by_path() {
+        let folder = std::env::temp_dir().join(format!("khz-files-{}", std::process::id()));
+        fs::create_dir_all(folder.join("b")).unwrap();
+        for name in ["z.st", "b/a.ST", "notes.txt"] {
+            fs::write(folder.join(name), "x").unwrap();
+        }
+        let Input::Sources(sources) = read(std::slice::from_ref(&folder)).unwrap() else { panic!("sources expected") };
+        let names: Vec<_> = sources.iter().map(|s| s.name.rsplit('/').next().unwrap().to_string()).collect();
+        assert_eq!(names, ["a.ST", "z.st"]);
+        fs::write(folder.join("empty.st"), "").unwrap();
+        assert!(matches!(read(std::slice::from_ref(&folder)), Err(FileError::Empty(_))));
+        fs::remove_dir_all(folder).unwrap();
+    }
+}

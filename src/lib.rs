@@ -1,0 +1,18 @@
+//! # Kilohertz: Structured Text at native speed, with every check in place
+//!
+//! Kilohertz compiles IEC 61131-3 Structured Text into verified bytecode containers and runs them, interpreted or as native code,
+//! under a scheduler that measures every task cycle and ends what overruns. This crate is the façade: it joins the stages
+//! ([`pipeline`]) and reads files ([`files`]). The stages themselves are crates of their own:
+//!
+//! - `khz-frontend`: text to containers, with diagnostics
+//! - `khz-bytecode`: containers, instructions, the verifier
+//! - `khz-machine`: what both engines must agree on
+//! - `khz-interp`, `khz-jit`: the engines
+//! - `khz-scheduler`: tasks, clocks, watchdogs, statistics
+//!
+//! The binary `khz` is in `src/main.rs`, a file for each subcommand in `src/cli/`.
+
+pub mod files;
+pub mod pipeline;
+
+pub use {khz_bytecode, khz_frontend, khz_interp, khz_jit, khz_machine, khz_scheduler};
