@@ -137,6 +137,16 @@ fn misspelt_words() {
 }
 
 #[test]
+fn names_that_are_near_to_a_word_are_still_names() {
+    assert_eq!(
+        body("foo;\ncast;"),
+        ["2:1 P0022 this has a value and does nothing with it", "3:1 P0022 this has a value and does nothing with it",]
+    );
+    assert_eq!(body("fort := 1; whille(a := 2); endif := 3; foo.bar := cast[1];"), Vec::<String>::new());
+    assert_eq!(messages("VAR_GLOBAL endvar : INT; vars, cased AT %MW0 : INT; END_VAR"), Vec::<String>::new());
+}
+
+#[test]
 fn missing_and_wrong_header_words() {
     assert_eq!(body("IF a b := 1; END_IF;"), ["2:5 P0004 expected `THEN` after the condition, found `b`"]);
     assert_eq!(body("IF a DO b := 1; END_IF;"), ["2:5 P0004 expected `THEN` after the condition, found `DO`"]);

@@ -125,7 +125,7 @@ fn random_tokens() {
 
 #[test]
 fn deep_nesting_is_refused_and_does_not_overflow() {
-    let deep = 100_000;
+    let deep = 30_000;
     let body = |inside: &str| format!("PROGRAM p\n{inside}\nEND_PROGRAM\n");
     let texts = [
         body(&format!("x := {}1;", "(".repeat(deep))),
@@ -176,10 +176,10 @@ fn time_is_linear() {
         "x := 1", "END_IF ", "IF ", "f(", "a : ", "VAR ", "VAR x ", "a,", "a.b", "{x", "x = ", ") ", "ENDIF ",
         "TYPE a ", "; ", "1.", "%",
     ] {
-        let text = format!("PROGRAM p\n{}", unit.repeat(100_000));
+        let text = format!("PROGRAM p\n{}", unit.repeat(40_000));
         let started = Instant::now();
         check(&text);
-        assert!(started.elapsed() < Duration::from_secs(10), "{unit}: {:?}", started.elapsed());
+        assert!(started.elapsed() < Duration::from_secs(5), "{unit}: {:?}", started.elapsed());
     }
 }
 

@@ -43,8 +43,8 @@ rules! {
     }
     UNTERMINATED_PRAGMA = "P0008" Error "a pragma has no end" {
         "A pragma begins with `{` and ends with `}`."
-        wrong "{attribute 'startup'\nFUNCTION f\nEND_FUNCTION\n"
-        right "{attribute 'startup'}\nFUNCTION f\nEND_FUNCTION\n"
+        wrong "{attribute 'startup'\nFUNCTION f\nEND_FUNCTION\nPROGRAM p\nEND_PROGRAM\n"
+        right "{attribute 'startup'}\nFUNCTION f\nEND_FUNCTION\nPROGRAM p\nEND_PROGRAM\n"
     }
     BAD_NUMBER = "P0009" Error "a number that cannot be read" {
         "Numbers are written `1_000`, `1.5`, `1.5E-3`, `16#FF`, `8#17`, `2#1010`. A `_` may stand between two digits. A name cannot begin with a digit."
@@ -133,8 +133,8 @@ rules! {
     }
     NOT_SUPPORTED = "P0026" Error "not supported by this version" {
         "This is known, and this version of the compiler cannot translate it."
-        wrong "FUNCTION_BLOCK Motor EXTENDS Drive\nEND_FUNCTION_BLOCK\n"
-        right "FUNCTION_BLOCK Motor\nEND_FUNCTION_BLOCK\n"
+        wrong "FUNCTION_BLOCK Motor EXTENDS Drive\nEND_FUNCTION_BLOCK\nPROGRAM p\nEND_PROGRAM\n"
+        right "FUNCTION_BLOCK Motor\nEND_FUNCTION_BLOCK\nPROGRAM p\nEND_PROGRAM\n"
     }
     UNKNOWN_TASK_PARAMETER = "P0027" Error "a task has no such parameter" {
         "A task has the parameters SINGLE, INTERVAL and PRIORITY. What else can be said about it is said with attributes before it."
@@ -148,8 +148,8 @@ rules! {
     }
     BAD_ATTRIBUTE = "P0029" Warning "an attribute that cannot be read" {
         "Attributes are written `{attribute 'name'}` or `{attribute 'name' := 'value'}`. One that cannot be read has no effect."
-        wrong "{attribute startup}\nFUNCTION f\nEND_FUNCTION\n"
-        right "{attribute 'startup'}\nFUNCTION f\nEND_FUNCTION\n"
+        wrong "{attribute startup}\nFUNCTION f\nEND_FUNCTION\nPROGRAM p\nEND_PROGRAM\n"
+        right "{attribute 'startup'}\nFUNCTION f\nEND_FUNCTION\nPROGRAM p\nEND_PROGRAM\n"
     }
     BAD_QUALIFIER = "P0030" Error "a qualifier that is too much" {
         "CONSTANT, RETAIN, NON_RETAIN and PERSISTENT may each stand once, and RETAIN and NON_RETAIN exclude one another."

@@ -1,6 +1,7 @@
 //! Misspelt reserved words: `ENDIF`, `ELSEIF`, `WHLE`, `END IF`.
 
 use super::Parser;
+use super::expr::literal_start;
 use crate::diagnostics::{Diagnostic, syntax as rules};
 use crate::syntax::keyword::Keyword;
 use crate::syntax::lexer::TokenKind;
@@ -10,7 +11,9 @@ const MAX_COMPARED_LEN: usize = 24;
 
 /// Whether someone who wrote `text` may well have meant `word` (upper case).
 pub(super) fn is_like(text: &str, word: &str) -> bool {
-    if !text.is_ascii() || text.len() > MAX_COMPARED_LEN {
+    // Most words differ so plainly that nothing need be counted.
+    let same_first = text.bytes().next().map(|byte| byte.to_ascii_uppercase()) == word.bytes().next();
+    if !same_first || !text.is_ascii() || text.len() > MAX_COMPARED_LEN || text.len().abs_diff(word.len()) > 3 {
         return false;
     }
     let plain = |from: &str| from.bytes().filter(|&byte| byte != b'_').map(|byte| byte.to_ascii_uppercase()).collect();
@@ -20,7 +23,7 @@ pub(super) fn is_like(text: &str, word: &str) -> bool {
         3..=6 => 1,
         _ => 2,
     };
-    text == word || (text.first() == word.first() && distance(&text, &word) <= allowed)
+    text == word || distance(&text, &word) <= allowed
 }
 
 /// How many letters must be put in, taken out, replaced or swapped with their neighbour to make one word of the other.
@@ -70,6 +73,20 @@ fn leads(word: Keyword) -> bool {
         || word.text().starts_with("END_")
 }
 
+/// Whether the word, were it spelt right, could stand before such a token: `foo;` is not a misspelt FOR.
+fn goes_before(word: Keyword, next: TokenKind) -> bool {
+    match word {
+        Keyword::Exit | Keyword::Continue | Keyword::Return => next == TokenKind::Semicolon,
+        Keyword::Else | Keyword::Repeat => next != TokenKind::Semicolon,
+        _ if word.text().starts_with("END_") => true,
+        _ => {
+            matches!(next, TokenKind::Ident | TokenKind::Minus | TokenKind::LeftParen | TokenKind::Direct)
+                || matches!(next, TokenKind::Keyword(Keyword::Not | Keyword::Constant))
+                || literal_start(next)
+        }
+    }
+}
+
 impl Parser<'_> {
     /// Reports that the current name was meant to be a reserved word.
     pub(super) fn report_misspelt(&mut self, word: Keyword) {
@@ -97,7 +114,9 @@ impl Parser<'_> {
             return true;
         }
         let text = self.slice(self.span());
-        let Some(&word) = Keyword::ALL.iter().find(|&&word| leads(word) && is_like(text, word.text())) else {
+        let next = self.kind_at(1);
+        let meant = |word: Keyword| leads(word) && goes_before(word, next) && is_like(text, word.text());
+        let Some(word) = Keyword::ALL.iter().copied().find(|&word| meant(word)) else {
             return false;
         };
         self.report_misspelt(word);
