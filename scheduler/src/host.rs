@@ -5,10 +5,11 @@
 use std::fmt;
 use std::io;
 use std::num::NonZeroU64;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use rustix::mm::{MlockAllFlags, mlockall};
 use rustix::process::getpid;
-use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity, set_current_timer_slack};
+use rustix::thread::{CpuSet, gettid, sched_getaffinity, sched_setaffinity, set_current_timer_slack};
 
 use crate::stop::StopHandle;
 
@@ -165,10 +166,59 @@ fn stay_on(cpu: usize) -> io::Result<()> {
 }
 
 fn set_fifo(priority: u8) -> io::Result<()> {
-    let parameters = libc::sched_param { sched_priority: i32::from(priority) };
-    // SAFETY: `parameters` is a valid sched_param that outlives the call; 0 names the calling thread.
-    let status = unsafe { libc::sched_setscheduler(0, libc::SCHED_FIFO, &raw const parameters) };
+    set_policy(0, libc::SCHED_FIFO, i32::from(priority))
+}
+
+/// Sets policy and priority of a thread of this process; 0 names the calling one.
+fn set_policy(thread: i32, policy: i32, priority: i32) -> io::Result<()> {
+    let parameters = libc::sched_param { sched_priority: priority };
+    // SAFETY: `parameters` is a valid sched_param that outlives the call.
+    let status = unsafe { libc::sched_setscheduler(thread, policy, &raw const parameters) };
     if status == 0 { Ok(()) } else { Err(io::Error::last_os_error()) }
+}
+
+/// A scan thread whose deadline has passed: it must run to notice, also where other processes want its processor.
+///
+/// An ordinary thread is lifted to the least real-time priority if the host allows it, and lowered again by itself when its run has ended. The lock is
+/// taken at a run's begin and end, and by the monitor after a deadline, never in a scan.
+#[derive(Debug, Default)]
+pub(crate) struct Lift(Mutex<Option<Lifted>>);
+
+#[derive(Debug)]
+struct Lifted {
+    thread: i32,
+    done: bool,
+}
+
+impl Lift {
+    /// The calling thread is the one to lift, until [`Lift::end`].
+    pub(crate) fn begin(&self) {
+        let thread = gettid().as_raw_nonzero().get();
+        *self.lock() = Some(Lifted { thread, done: false });
+    }
+
+    /// Lifts it, once.
+    pub(crate) fn lift(&self) {
+        if let Some(lifted) = self.lock().as_mut().filter(|lifted| !lifted.done) {
+            // SAFETY: takes a number and touches no memory of ours.
+            let policy = unsafe { libc::sched_getscheduler(lifted.thread) };
+            // Refused is no harm: the thread notices when its turn comes.
+            lifted.done = policy == libc::SCHED_OTHER && set_policy(lifted.thread, libc::SCHED_FIFO, 1).is_ok();
+        }
+    }
+
+    /// Lowers the calling thread again, if it was lifted.
+    pub(crate) fn end(&self) {
+        if self.lock().take().is_some_and(|lifted| lifted.done) {
+            // What could be raised can be lowered.
+            let _ = set_policy(0, libc::SCHED_OTHER, 0);
+        }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Option<Lifted>> {
+        // The value is whole at every step, so a panic elsewhere while it was locked does not matter.
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
 }
 
 fn ask_for_short_slice() -> io::Result<()> {
@@ -209,6 +259,28 @@ mod tests {
         let (report, used) = on_scan_thread(&options, |report| (report, rustix::thread::sched_getcpu())).unwrap();
         assert!(report.first_refusal().is_none(), "{report:?}");
         assert_eq!(used, cpu);
+    }
+
+    #[test]
+    fn a_lifted_thread_comes_down_again() {
+        let policy = || {
+            // SAFETY: takes a number and touches no memory of ours.
+            unsafe { libc::sched_getscheduler(0) }
+        };
+        std::thread::spawn(move || {
+            let lift = Lift::default();
+            lift.lift();
+            assert_eq!(policy(), libc::SCHED_OTHER, "nobody to lift");
+            lift.begin();
+            lift.lift();
+            lift.lift();
+            lift.end();
+            assert_eq!(policy(), libc::SCHED_OTHER);
+            lift.lift();
+            assert_eq!(policy(), libc::SCHED_OTHER, "the run has ended");
+        })
+        .join()
+        .unwrap();
     }
 
     #[test]

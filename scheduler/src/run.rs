@@ -24,8 +24,16 @@ pub enum RunOutcome {
     Faulted(Resource<Faulted>),
 }
 
-/// Runs rounds.
-pub fn run(mut resource: Resource<Running>, hooks: &mut Hooks<'_>, options: RunOptions) -> RunOutcome {
+/// Runs rounds on the calling thread.
+pub fn run(resource: Resource<Running>, hooks: &mut Hooks<'_>, options: RunOptions) -> RunOutcome {
+    let guard = resource.guard();
+    guard.begin_run();
+    let outcome = run_rounds(resource, hooks, options);
+    guard.end_run();
+    outcome
+}
+
+fn run_rounds(mut resource: Resource<Running>, hooks: &mut Hooks<'_>, options: RunOptions) -> RunOutcome {
     let mut scans = 0;
     loop {
         if options.scans.is_some_and(|wanted| scans >= wanted) {

@@ -16,7 +16,7 @@ use khz_machine::engine::DeadlineCell;
 use khz_machine::trap::TrapCode;
 
 use crate::clock::monotonic_now_ns;
-use crate::host;
+use crate::host::{self, Lift};
 use crate::stop::StopHandle;
 use crate::time::DurationNs;
 
@@ -40,6 +40,7 @@ pub struct Guard {
     /// Shortest deadline that may be armed; 0: none ever is.
     shortest_ns: u64,
     shutdown: AtomicBool,
+    lift: Lift,
 }
 
 impl Guard {
@@ -52,6 +53,7 @@ impl Guard {
             stop,
             shortest_ns: shortest.0,
             shutdown: AtomicBool::new(false),
+            lift: Lift::default(),
         })
     }
 
@@ -86,6 +88,16 @@ impl Guard {
         true
     }
 
+    /// The calling thread runs rounds from now on, until [`Guard::end_run`].
+    pub fn begin_run(&self) {
+        self.lift.begin();
+    }
+
+    /// The calling thread has ended its run.
+    pub fn end_run(&self) {
+        self.lift.end();
+    }
+
     /// Lets code run again after a fault or a stop.
     pub fn clear(&self) {
         self.disarm();
@@ -112,6 +124,8 @@ impl Guard {
             return armed.min(latest);
         }
         if self.armed.compare_exchange(armed, EXPIRED, Ordering::AcqRel, Ordering::Relaxed).is_ok() {
+            // Lifted first: once the cell is set, the scan thread may be past the end of its run.
+            self.lift.lift();
             self.cell.expire(TrapCode::Watchdog);
         }
         latest
@@ -127,6 +141,7 @@ impl Guard {
         if requests == 1 && now_ns < end_ns {
             return Some(end_ns);
         }
+        self.lift.lift();
         self.cell.expire(TrapCode::Stopped);
         None
     }

@@ -33,6 +33,7 @@ use crate::stop::StopHandle;
 use crate::task::{TaskIndex, TaskSet};
 use crate::time::TimeNs;
 use crate::wake::Wake;
+use crate::watchdog::Guard;
 
 /// Owner of a container: a verified one, or a bare one in tests. The scheduler reads tables only and checks every index it takes
 /// from them; code it gives to engines, which accept nothing but [`Verified`].
@@ -164,6 +165,11 @@ impl<S> Resource<S> {
     /// Begins the figures anew.
     pub fn clear_statistics(&mut self) {
         self.core.clear_statistics();
+    }
+
+    /// What the monitor watches it through.
+    pub(crate) fn guard(&self) -> Arc<Guard> {
+        Arc::clone(&self.core.guard)
     }
 
     fn faulted(core: Box<Core>, report: Box<FaultReport>) -> Resource<Faulted> {

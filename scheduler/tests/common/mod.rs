@@ -1,6 +1,7 @@
 //! A scripted engine and small containers: the scheduler is tested without any real engine.
 #![allow(dead_code, reason = "each test file uses its own part")]
 
+use std::io::Write as _;
 use std::sync::{Arc, Mutex};
 
 use khz_bytecode::container::{Container, OverrunPolicy, ProgramInstance, SingleSource, Task, TaskExtension, TaskType};
@@ -189,6 +190,12 @@ pub fn traced(resource: Resource<Stopped>, rows: Vec<(u64, usize, i64)>, scans: 
     let mut hooks = Hooks { io: &mut NoIo, inputs: &mut rows, observer: &mut log };
     let outcome = run(resource.start().unwrap(), &mut hooks, RunOptions { scans: Some(scans) });
     (log.take(), outcome)
+}
+
+/// Shows a measurement; with `--nocapture` it is seen.
+pub fn show(line: &str) {
+    // A closed stderr is no failure of a test.
+    let _ = writeln!(std::io::stderr(), "{line}");
 }
 
 /// No hooks.
