@@ -18,6 +18,7 @@
 pub mod assembler;
 pub mod container;
 pub mod disassembler;
+pub mod documentation;
 pub mod ids;
 pub mod instruction;
 pub mod limits;

@@ -271,10 +271,8 @@ impl Assembler {
     }
 
     fn field_offset(&self, ty: Option<TypeId>, field: usize) -> Option<u32> {
-        let record = match self.container.types.types.get(ty?.index())? {
-            Type::Struct(record) | Type::Union(record) | Type::Block { record, .. } => record,
-            _ => return None,
-        };
+        let ty = self.container.types.types.get(ty?.index())?;
+        let (Type::Struct(record) | Type::Union(record) | Type::Block { record, .. }) = ty else { return None };
         record.fields.get(field).map(|field| field.offset)
     }
 }

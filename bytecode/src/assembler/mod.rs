@@ -206,8 +206,13 @@ impl Assembler {
                 words.next("keyword")?;
                 let name = words.word("name")?;
                 let next = counts.entry(*kind).or_default();
-                let value = *next;
+                let mut value = *next;
                 *next += 1;
+                if *kind == Kind::Task {
+                    // A task is named by its id, which need not be its position.
+                    let id = line.tokens.windows(2).find(|pair| pair.first().is_some_and(|t| t.text == "id"));
+                    value = id.and_then(|pair| tokens::number(&pair.last()?.text)).unwrap_or(value);
+                }
                 self.define(*kind, name, value, &words)?;
             }
         }

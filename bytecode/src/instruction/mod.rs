@@ -267,7 +267,7 @@ macro_rules! define_instruction {
             ///
             /// # Errors
             /// The reason in words: an unknown mnemonic, too few or too many words, or a word that is no value of its kind.
-            pub fn from_words<'w>(mnemonic: &str, words: &mut dyn Iterator<Item = &'w str>) -> Result<Instruction, String> {
+            pub fn from_words(mnemonic: &str, words: &mut dyn Iterator<Item = &str>) -> Result<Instruction, String> {
                 let instruction = match mnemonic {
                     $($mnemonic => Instruction::$variant { $($field: <kind::$kind as Immediate>::read_text(stringify!($field), words)?),* },)*
                     _ => Self::plain_from_words(mnemonic, words)?,
@@ -292,7 +292,7 @@ impl Instruction {
         Ok(Instruction::Helper(op, capacities))
     }
 
-    fn plain_from_words<'w>(mnemonic: &str, words: &mut dyn Iterator<Item = &'w str>) -> Result<Instruction, String> {
+    fn plain_from_words(mnemonic: &str, words: &mut dyn Iterator<Item = &str>) -> Result<Instruction, String> {
         if let Some(op) = NumericOp::ALL.iter().find(|op| op.mnemonic() == mnemonic) {
             return Ok(Instruction::Numeric(*op));
         }
