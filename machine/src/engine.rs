@@ -99,3 +99,20 @@ pub trait Engine: Send {
     /// Bytes of the code it runs: machine code, or register code.
     fn code_bytes(&self) -> usize;
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_first_reason_to_end_wins_until_cleared() {
+        let cell = DeadlineCell::new();
+        assert_eq!(cell.expired(), None);
+        cell.expire(TrapCode::Stopped);
+        cell.expire(TrapCode::Watchdog);
+        assert_eq!(cell.expired(), Some(TrapCode::Stopped));
+        assert_ne!(cell.as_atomic().load(Ordering::Relaxed), 0, "native code sees it");
+        cell.clear();
+        assert_eq!(cell.expired(), None);
+    }
+}

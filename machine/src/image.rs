@@ -195,3 +195,83 @@ impl Clone for Image {
         copy
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use khz_bytecode::container::{InitRun, Task};
+    use khz_bytecode::value::Storage;
+
+    fn container() -> Container {
+        let mut container = Container::default();
+        container.parameters.data_region_bytes = 100;
+        container.parameters.frame_bytes = 24;
+        container.parameters.memory_image_bytes = 3;
+        container.parameters.output_image_bytes = 2;
+        container.parameters.input_image_bytes = 1;
+        container.types.slots = vec![Storage::I64; 9];
+        container.tasks.tasks = vec![Task::default(); 2];
+        let run = |region, offset, repeat, bytes: &[u8]| InitRun { region, offset, repeat, bytes: bytes.to_vec() };
+        container.types.init_image = vec![
+            run(Region::Slots, 8, 1, &[5]),
+            run(Region::Data, 16, 3, &[1, 2]),
+            run(Region::Memory, 2, 1, &[7]),
+            run(Region::Output, 0, 2, &[9]),
+        ];
+        container
+    }
+
+    #[test]
+    fn regions_follow_each_other_on_cache_lines() {
+        let layout = ImageLayout::new(&container(), 1 << 20).unwrap();
+        assert_eq!((layout.slots.clone(), layout.data.clone()), (0..72, 128..228));
+        assert_eq!(layout.frames, [256..280, 320..344]);
+        assert_eq!(
+            (layout.memory.clone(), layout.output.clone(), layout.input.clone()),
+            (384..387, 448..450, 512..513)
+        );
+        assert_eq!((layout.readable(), layout.writable(), layout.total_bytes()), (128..513, 128..450, 513));
+        assert_eq!(layout.fixed_start(BytePlace::Memory), Some(384));
+        assert_eq!(layout.fixed_start(BytePlace::This), None);
+        assert!(Image::new(layout, &container()).bytes().as_ptr().align_offset(64) == 0);
+    }
+
+    #[test]
+    fn an_image_beyond_the_limit_is_refused() {
+        let refused = ImageLayout::new(&container(), 512).unwrap_err();
+        assert_eq!(refused, ImageTooLarge { needed_bytes: 513, limit_bytes: 512 });
+        assert!(refused.to_string().contains("--max-image"), "{refused}");
+        let mut huge = container();
+        huge.parameters.data_region_bytes = u32::MAX;
+        huge.parameters.frame_bytes = u32::MAX;
+        assert_eq!(ImageLayout::new(&huge, u64::MAX).unwrap_err().limit_bytes, i32::MAX as u64);
+    }
+
+    #[test]
+    fn initial_values_come_back_at_reset() {
+        let container = container();
+        let fresh = Image::new(ImageLayout::new(&container, 1 << 20).unwrap(), &container);
+        let bytes = fresh.bytes();
+        assert_eq!(bytes[8..10], [5, 0]);
+        assert_eq!(bytes[128 + 15..128 + 23], [0, 1, 2, 1, 2, 1, 2, 0]);
+        assert_eq!((bytes[386], bytes[448], bytes[449], bytes[512]), (7, 9, 9, 0));
+        let mut used = fresh.clone();
+        assert_eq!(used.bytes(), fresh.bytes());
+        used.bytes_mut().fill(0xEE);
+        used.reset(&container);
+        assert_eq!(used.bytes(), fresh.bytes());
+    }
+
+    #[test]
+    fn images_differ_outside_frames() {
+        let container = container();
+        let image = Image::new(ImageLayout::new(&container, 1 << 20).unwrap(), &container);
+        let mut other = image.clone();
+        other.bytes_mut()[256..344].fill(1);
+        assert_eq!(image.first_difference(&other), None);
+        other.bytes_mut()[449] = 1;
+        assert_eq!(image.first_difference(&other), Some(449));
+        other.bytes_mut()[71] = 1;
+        assert_eq!(image.first_difference(&other), Some(71));
+    }
+}

@@ -48,3 +48,18 @@ impl Trap {
         &self.chain[..usize::from(self.chain_len)]
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_chain_keeps_the_innermost_calls() {
+        let place = |offset| CodePlace { function: FunctionId(1), offset };
+        let mut trap = Trap::new(TrapCode::CallDepth, place(0), [65, 0, 0]);
+        assert!(trap.chain().is_empty());
+        (1..100).for_each(|offset| trap.push_caller(place(offset)));
+        let expected: Vec<_> = (1..=MAX_TRAP_CHAIN as u32).map(place).collect();
+        assert_eq!(trap.chain(), expected);
+    }
+}
