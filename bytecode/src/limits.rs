@@ -20,6 +20,8 @@ pub const MAX_UNION_ALTERNATIVES: u32 = 256;
 pub const MAX_LOOP_DEPTH: u16 = 64;
 /// Most `l` slots that hold references beside the parameters of one function.
 pub const MAX_REFERENCE_LOCALS: usize = 1024;
+/// Most function block instances that the verifier lists one by one, and most steps of a proof that need not succeed.
+pub const MAX_BLOCK_INSTANCES: usize = 1 << 20;
 /// Most entries that the verifier's lists (stacks at block starts, effects of functions) may have in total.
 pub const MAX_ANALYSIS_ENTRIES: usize = 8 << 20;
 /// Largest operand stack a function may need.

@@ -12,6 +12,9 @@ use crate::ids::FunctionId;
 use crate::limits::{FRAME_ALIGN_BYTES, MAX_ANALYSIS_ENTRIES};
 use crate::value::{BytePlace, SlotPlace};
 
+/// Effects that may be merged for each that may be listed: how often a list may be taken over by callers.
+const MERGES_PER_ENTRY: usize = 8;
+
 /// Functions in an order in which callees stand before their callers.
 pub(super) fn callees_first(drafts: &[Draft]) -> Check<(Vec<FunctionId>, Vec<Vec<FunctionId>>)> {
     let callees: Vec<Vec<FunctionId>> = drafts.iter().map(callees).collect();
@@ -84,7 +87,7 @@ pub(super) fn close(
     let (order, callees) = callees_first(drafts)?;
     // Direct calls alone can not go deeper than was proved; only a virtual call can bring a function anywhere.
     let any_virtual = drafts.iter().any(|d| d.touches.iter().any(|t| matches!(t.kind, TouchKind::CallVirtual(_))));
-    let mut entries = 0;
+    let (mut entries, mut merged) = (0, 0);
     for id in order {
         let function = &container.functions[id.index()];
         let own_callees = &callees[id.index()];
@@ -109,10 +112,17 @@ pub(super) fn close(
             );
             return Err(VerifyError::header(Rule::CallDepth, id, message));
         }
+        // What is merged counts, too: many callers of many callees take time although their union is small.
+        let inner = own_callees.iter().map(|callee| entry_count(&facts[callee.index()].effects));
+        merged = inner.fold(merged, usize::saturating_add);
+        let too_many = || VerifyError::header(Rule::AnalysisSize, id, "the effects of functions are too many");
+        if merged > MAX_ANALYSIS_ENTRIES * MERGES_PER_ENTRY {
+            return Err(too_many());
+        }
         let effects = effects(function, &drafts[id.index()], own_callees, facts, any_virtual);
         entries += entry_count(&effects);
         if entries > MAX_ANALYSIS_ENTRIES {
-            return Err(VerifyError::header(Rule::AnalysisSize, id, "the effects of functions are too many"));
+            return Err(too_many());
         }
         let facts = &mut facts[id.index()];
         facts.call_depth = depth + 1;

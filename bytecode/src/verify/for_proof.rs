@@ -12,7 +12,8 @@ use crate::container::{ControlPlace, ForLoop, Owner, Type};
 use crate::ids::{ForId, TypeId};
 use crate::value::{BytePlace, SlotPlace, Storage};
 
-/// Whether FOR loop `id` of a function, over the blocks of loop `number`, keeps its control variable.
+/// Whether FOR loop `id` of a function, over the blocks of loop `number`, keeps its control variable. Each step taken counts down
+/// `steps`; at 0 nothing is proven any more.
 pub(super) fn control_is_proven(
     scope: &Scope<'_, '_>,
     own: &FunctionFacts,
@@ -20,6 +21,7 @@ pub(super) fn control_is_proven(
     id: ForId,
     touches: &[Touch],
     facts: &[FunctionFacts],
+    steps: &mut usize,
 ) -> bool {
     let Some(descriptor) = scope.function.for_loops.get(id.index()) else { return false };
     let proof = Proof { scope, facts, descriptor };
@@ -32,7 +34,17 @@ pub(super) fn control_is_proven(
             // Its own `for.next` is what moves it on; its `for.enter` is outside.
             !matches!(own.instructions[touch.instruction].instruction, ForNext { id: next, .. } if next == id)
         });
-        touches.all(|touch| proof.keeps(touch.kind))
+        touches.all(|touch| {
+            let cost = match touch.kind {
+                TouchKind::Call(callee) if matches!(descriptor.control, ControlPlace::Bytes(..)) => {
+                    let effects = &facts[callee.index()].effects;
+                    1 + effects.bytes_written.len() + effects.written_through_references.len()
+                }
+                _ => 1,
+            };
+            *steps = steps.saturating_sub(cost);
+            *steps > 0 && proof.keeps(touch.kind)
+        })
     })
 }
 

@@ -7,7 +7,9 @@ use super::rules::Rule;
 use super::types::TypeTable;
 use crate::container::{BlockInstance, Constant, Container, InitRun, Owner, Region, Type};
 use crate::ids::TypeId;
-use crate::limits::{MAX_CALL_DEPTH, MAX_STACK_DEPTH, NULL_GUARD_BYTES, REGION_ALIGN_BYTES, SLOT_BYTES};
+use crate::limits::{
+    MAX_BLOCK_INSTANCES, MAX_CALL_DEPTH, MAX_STACK_DEPTH, NULL_GUARD_BYTES, REGION_ALIGN_BYTES, SLOT_BYTES,
+};
 use crate::value::Storage;
 
 /// Bits of the one NaN of REAL.
@@ -69,7 +71,7 @@ pub(super) fn check_constants(container: &Container) -> Check {
             Constant::F64(bits) => is_foreign_f64(*bits),
         };
         if foreign {
-            return Err(VerifyError::entry(Rule::ConstantNan, "const", index, "it is a NaN, but not the one NaN"));
+            return Err(VerifyError::entry(Rule::ConstantNan, "constant", index, "it is a NaN, but not the one NaN"));
         }
     }
     Ok(())
@@ -114,7 +116,10 @@ pub(super) fn check_variables(container: &Container, types: &TypeTable<'_>) -> C
 /// Entry functions and their owners were checked before.
 pub(super) fn check_instances(container: &Container, types: &TypeTable<'_>) -> Check<Vec<Option<u32>>> {
     let rows = &container.types.block_instances;
-    let error = |index, message: String| VerifyError::entry(Rule::BlockInstances, "instance_row", index, message);
+    let error = |index, message: String| VerifyError::entry(Rule::BlockInstances, "block_instance", index, message);
+    let too_many = |index| error(index, format!("the variables hold more than {MAX_BLOCK_INSTANCES} instances"));
+    // Steps left for listing what must be there: instances share it, so that many large ones do not add up.
+    let mut budget = MAX_BLOCK_INSTANCES;
     let mut blocks = Vec::new();
     let mut own_variables = BTreeSet::new();
     let mut next = 0;
@@ -147,17 +152,21 @@ pub(super) fn check_instances(container: &Container, types: &TypeTable<'_>) -> C
             return Err(error(next, message));
         }
         let mut expected = Vec::new();
-        let complete = types.block_rows(block_type, first.offset, own.len(), &mut expected);
-        compare_rows(&own[1..], expected, complete, next + 1)?;
+        if !types.block_rows(block_type, first.offset, budget, &mut expected) {
+            return Err(too_many(next));
+        }
+        budget -= expected.len();
+        compare_rows(&own[1..], &expected, next + 1)?;
         blocks.push(Some(first.offset));
         next += count;
     }
     let globals = rows.get(next..).unwrap_or_default();
     let mut expected = Vec::new();
-    let variables = container.types.data.iter().filter(|variable| !own_variables.contains(&variable.offset));
-    let mut variables = variables;
-    let complete = variables.all(|v| types.block_rows(v.ty, v.offset, globals.len(), &mut expected));
-    compare_rows(globals, expected, complete, next)?;
+    let mut variables = container.types.data.iter().filter(|variable| !own_variables.contains(&variable.offset));
+    if !variables.all(|variable| types.block_rows(variable.ty, variable.offset, budget, &mut expected)) {
+        return Err(too_many(next));
+    }
+    compare_rows(globals, &expected, next)?;
     Ok(blocks)
 }
 
@@ -170,30 +179,56 @@ fn instance_block_type(container: &Container, number: usize) -> Option<TypeId> {
     }
 }
 
-/// Compares rows with what must be there, in any order; `at` is the position of the first in the table.
-fn compare_rows(rows: &[BlockInstance], mut expected: Vec<BlockInstance>, complete: bool, at: usize) -> Check {
+/// Checks that `rows` list exactly the instances that `expected` lists; `at` is the position of the first in the table.
+///
+/// The canonical rows are accepted as they are; other ways to put the same instances into rows are unfolded and compared one by one.
+fn compare_rows(rows: &[BlockInstance], expected: &[BlockInstance], at: usize) -> Check {
     let key = |row: &BlockInstance| (row.offset, row.ty, row.stride, row.count);
-    let mut found: Vec<_> = rows.iter().copied().enumerate().map(|(number, row)| (row, at + number)).collect();
-    found.sort_by_key(|(row, _)| key(row));
-    expected.sort_by_key(key);
-    let describe = |row: &BlockInstance| {
-        format!("type {} at offset {} (count {}, stride {})", row.ty, row.offset, row.count, row.stride)
+    let sorted = |rows: &[BlockInstance]| {
+        let mut keys: Vec<_> = rows.iter().map(key).collect();
+        keys.sort_unstable();
+        keys
     };
-    for (want, (row, position)) in expected.iter().zip(&found) {
-        if want != row {
-            let message = format!("it lists {}; {} was expected", describe(row), describe(want));
-            return Err(VerifyError::entry(Rule::BlockInstances, "instance_row", *position, message));
-        }
-    }
-    if complete && expected.len() == found.len() {
+    if sorted(rows) == sorted(expected) {
         return Ok(());
     }
-    let message = match expected.get(found.len()) {
-        Some(missing) => format!("{} is not listed", describe(missing)),
-        None => "it lists more instances than there are".to_string(),
+    let error = |position: usize, message: String| {
+        Err(VerifyError::entry(Rule::BlockInstances, "block_instance", at + position, message))
     };
-    let position = at + rows.len().min(expected.len());
-    Err(VerifyError::entry(Rule::BlockInstances, "instance_row", position, message))
+    let (Some(found), Some(wanted)) = (unfold(rows), unfold(expected)) else {
+        return error(0, format!("more than {MAX_BLOCK_INSTANCES} instances, not listed by array"));
+    };
+    for (number, (offset, ty, row)) in found.iter().enumerate() {
+        if wanted.get(number).map(|(offset, ty, _)| (offset, ty)) != Some((offset, ty)) {
+            return error(
+                *row,
+                format!("it lists type {ty} at offset {offset}, where no instance is or one is missing"),
+            );
+        }
+    }
+    match wanted.get(found.len()) {
+        Some((offset, ty, _)) => {
+            error(rows.len(), format!("the instance of type {ty} at offset {offset} is not listed"))
+        }
+        None => Ok(()),
+    }
+}
+
+/// Every instance of some rows as (offset, type, position of its row), ascending; none when they are too many or too far.
+fn unfold(rows: &[BlockInstance]) -> Option<Vec<(u32, TypeId, usize)>> {
+    let total = rows.iter().fold(0u64, |total, row| total.saturating_add(u64::from(row.count)));
+    if total > MAX_BLOCK_INSTANCES as u64 {
+        return None;
+    }
+    let mut all = Vec::new();
+    for (position, row) in rows.iter().enumerate() {
+        for number in 0..row.count {
+            let offset = number.checked_mul(row.stride).and_then(|inside| row.offset.checked_add(inside))?;
+            all.push((offset, row.ty, position));
+        }
+    }
+    all.sort_unstable();
+    Some(all)
 }
 
 fn region_bytes(container: &Container, region: Region) -> u64 {

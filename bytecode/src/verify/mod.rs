@@ -69,7 +69,7 @@ pub fn verify(container: Container) -> Result<Verified, VerifyError> {
 pub fn block_rows(types: &TypeSection, ty: TypeId, offset: u32) -> Result<Vec<BlockInstance>, VerifyError> {
     let table = TypeTable::new(types)?;
     let mut rows = Vec::new();
-    table.block_rows(ty, offset, usize::from(u16::MAX), &mut rows);
+    table.block_rows(ty, offset, crate::limits::MAX_BLOCK_INSTANCES, &mut rows);
     Ok(rows)
 }
 
@@ -137,11 +137,13 @@ fn examine_code(scope: &Scope<'_, '_>, entries: &mut usize) -> Check<(FunctionFa
 }
 
 fn prove_for_loops(scopes: &[Scope<'_, '_>], drafts: &[Draft], functions: &mut [FunctionFacts]) {
+    // Steps left for what is nice to know: when a hostile file uses them up, the rest counts as not proven.
+    let mut steps = crate::limits::MAX_ANALYSIS_ENTRIES;
     for (index, (scope, draft)) in scopes.iter().zip(drafts).enumerate() {
         for number in 0..functions[index].loops.len() {
             let own = &functions[index];
             let Some(id) = own.loops[number].for_loop else { continue };
-            let proven = for_proof::control_is_proven(scope, own, number, id, &draft.touches, functions);
+            let proven = for_proof::control_is_proven(scope, own, number, id, &draft.touches, functions, &mut steps);
             functions[index].loops[number].control_is_proven = proven;
         }
     }
