@@ -1,5 +1,7 @@
 //! No text makes the parser panic, hang or flood the user with messages.
 
+#![expect(clippy::disallowed_methods, reason = "these tests measure how long hostile texts take")]
+
 #[allow(dead_code, reason = "each test file uses its own part of what they share")]
 mod support;
 

@@ -1,7 +1,5 @@
 //! Names as small numbers: comparing two names is comparing two `u32`s.
 
-use std::collections::HashMap;
-
 /// An interned text. Symbols of one [`Interner`] are equal exactly if their texts are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Symbol(u32);
@@ -16,19 +14,22 @@ impl Symbol {
     }
 }
 
+/// Finds the symbol of a text.
+#[expect(clippy::disallowed_types, reason = "looked up once a name and never iterated, so its order reaches no result")]
+type Index = std::collections::HashMap<Box<str>, Symbol>;
+
 /// The table of names. Identifiers are case-insensitive in IEC 61131-3 (6.1.2), so each text knows its folded form:
 /// upper case, as the standard writes its own names.
 #[derive(Debug)]
 pub struct Interner {
     texts: Vec<Box<str>>,
     folded: Vec<Symbol>,
-    /// Looked up, never iterated: its order reaches no result.
-    index: HashMap<Box<str>, Symbol>,
+    index: Index,
 }
 
 impl Default for Interner {
     fn default() -> Self {
-        let mut new = Self { texts: Vec::new(), folded: Vec::new(), index: HashMap::new() };
+        let mut new = Self { texts: Vec::new(), folded: Vec::new(), index: Index::new() };
         new.add("", None);
         new
     }
