@@ -1,0 +1,309 @@
+//! Machine code and what keeps it: the only place that maps memory, links and calls native code.
+//!
+//! This file may use `unsafe`: it frees code when its last holder goes, and it calls code with the interface that the lowering gave it.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use cranelift_codegen::ir::{self, Signature};
+use cranelift_codegen::isa::OwnedTargetIsa;
+use cranelift_codegen::settings::{self, Configurable};
+use cranelift_codegen::{Context as Compilation, control::ControlPlane};
+use cranelift_jit::{ArenaMemoryProvider, JITBuilder, JITModule};
+use cranelift_module::{FuncId, Linkage, Module};
+use khz_bytecode::ids::FunctionId;
+use khz_machine::trap::CodePlace;
+
+use crate::build::ProgramMemory;
+use crate::context::Context;
+use crate::lower::Linker;
+use crate::mir::{Place, PlaceData};
+use crate::{JitError, runtime};
+
+/// A function as it is compiled for a program's memory.
+pub type Key = (FunctionId, ProgramMemory);
+
+/// Address space set aside for code, for each instruction of bytecode and once, in bytes. Only what is used gets memory.
+const RESERVED_PER_INSTRUCTION: usize = 512;
+const RESERVED_ALWAYS: usize = 1 << 20;
+
+/// One row of the engine's table of places.
+#[derive(Debug, Clone, Copy)]
+pub struct PlaceEntry {
+    /// Where in the bytecode.
+    pub place: CodePlace,
+    /// The inlined call around it.
+    pub caller: Option<u32>,
+}
+
+/// Finished code. Freed when the last `Arc` of it goes.
+pub struct Code {
+    module: Option<JITModule>,
+    /// Places that traps name.
+    pub places: Vec<PlaceEntry>,
+    addresses: BTreeMap<Key, *const u8>,
+    bytes: usize,
+}
+
+// SAFETY: finished code is never written; the addresses in it name its own memory.
+unsafe impl Send for Code {}
+// SAFETY: as above; all access is shared reading.
+unsafe impl Sync for Code {}
+
+impl std::fmt::Debug for Code {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Code").field("bytes", &self.bytes).field("functions", &self.addresses.len()).finish()
+    }
+}
+
+impl Drop for Code {
+    fn drop(&mut self) {
+        if let Some(module) = self.module.take() {
+            // SAFETY: every handle that can call into this code holds an `Arc` of it, so none is left and none is running.
+            unsafe { module.free_memory() };
+        }
+    }
+}
+
+impl Code {
+    /// Bytes of machine code.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        self.bytes
+    }
+
+    /// The address of a function, for tables that this code itself reads.
+    #[must_use]
+    pub fn address(&self, key: Key) -> Option<*const u8> {
+        self.addresses.get(&key).copied()
+    }
+}
+
+/// A function that can be run; it keeps its code alive.
+#[derive(Debug, Clone)]
+pub struct Handle {
+    code: Arc<Code>,
+    address: *const u8,
+    /// Image offsets of the program's slots and data block, for code that instances share.
+    shared: Option<(u32, u32)>,
+}
+
+// SAFETY: the address names code that the handle keeps alive and that never changes.
+unsafe impl Send for Handle {}
+
+impl Handle {
+    /// A handle of a function without parameters and results.
+    #[must_use]
+    pub fn new(code: Arc<Code>, key: Key, shared: Option<(u32, u32)>) -> Option<Handle> {
+        let address = code.address(key)?;
+        Some(Handle { code, address, shared })
+    }
+
+    /// The code it belongs to.
+    #[must_use]
+    pub fn code(&self) -> &Code {
+        &self.code
+    }
+
+    /// Runs it; 0 means that it came to its end.
+    ///
+    /// # Safety
+    /// `context` is complete: its image is that of the layout that the code was compiled for, its deadline cell and tables outlive the call, and
+    /// nobody else uses the image meanwhile. `frame` is the start of a task's frame bytes in that image. The function was compiled
+    /// without parameters and results.
+    pub unsafe fn run(&self, context: &mut Context, frame: *mut u8) -> i32 {
+        let image = context.image;
+        match self.shared {
+            None => {
+                type Plain = extern "C" fn(*mut u8, *mut Context, *mut u8) -> i32;
+                // SAFETY: the lowering gave functions without program parameters exactly this interface, in the host's C convention.
+                let function = unsafe { std::mem::transmute::<*const u8, Plain>(self.address) };
+                function(image, context, frame)
+            }
+            Some((slots, block)) => {
+                type Shared = extern "C" fn(*mut u8, *mut Context, *mut u8, *mut u8, *mut u8) -> i32;
+                // SAFETY: as above, with the two addresses that shared code takes.
+                let function = unsafe { std::mem::transmute::<*const u8, Shared>(self.address) };
+                let (slots, block) = (image.wrapping_add(slots as usize), image.wrapping_add(block as usize));
+                function(image, context, frame, slots, block)
+            }
+        }
+    }
+}
+
+/// The host as a target, with its CPU's features.
+///
+/// # Errors
+/// A host that Cranelift does not know.
+pub fn host_isa(verify_ir: bool) -> Result<OwnedTargetIsa, JitError> {
+    let mut flags = settings::builder();
+    let options = [
+        ("opt_level", "speed"),
+        ("enable_verifier", if verify_ir { "true" } else { "false" }),
+        ("is_pic", "false"),
+        ("use_colocated_libcalls", "false"),
+        // Functions with several results return them as values; what has no register goes through memory.
+        ("enable_multi_ret_implicit_sret", "true"),
+        // Guards are explicit; nothing here relies on a guard page.
+        ("enable_probestack", "false"),
+        ("unwind_info", "false"),
+    ];
+    for (name, value) in options {
+        flags.set(name, value).map_err(|error| JitError::Host(error.to_string()))?;
+    }
+    let builder = cranelift_native::builder().map_err(|error| JitError::Host(error.to_string()))?;
+    builder.finish(settings::Flags::new(flags)).map_err(|error| JitError::Host(error.to_string()))
+}
+
+/// Code in the making.
+pub struct Assembly {
+    module: JITModule,
+    functions: BTreeMap<Key, FuncId>,
+    signatures: Box<dyn Fn(Key) -> Signature + Send>,
+    routines: BTreeMap<&'static str, FuncId>,
+    places: Vec<PlaceEntry>,
+    /// For each function that is at hand: local place to table position.
+    known_places: BTreeMap<Place, u32>,
+    bytes: usize,
+    stack_bytes: BTreeMap<Key, u32>,
+    failure: Option<JitError>,
+}
+
+impl Assembly {
+    /// An empty module. `instructions`: how much bytecode will be compiled; `signatures` gives the signature of any function.
+    ///
+    /// # Errors
+    /// No memory for code.
+    pub fn new(
+        isa: OwnedTargetIsa,
+        instructions: usize,
+        signatures: Box<dyn Fn(Key) -> Signature + Send>,
+    ) -> Result<Self, JitError> {
+        let mut builder = JITBuilder::with_isa(isa, Box::new(|call| format!("{call:?}")));
+        let reserved = instructions.saturating_mul(RESERVED_PER_INSTRUCTION).saturating_add(RESERVED_ALWAYS);
+        let arena = ArenaMemoryProvider::new_with_size(reserved).map_err(|error| JitError::Memory(error.to_string()))?;
+        builder.memory_provider(Box::new(arena));
+        for routine in runtime::all() {
+            builder.symbol(routine.name, routine.address);
+        }
+        // Asked before the search in the process, and never without an answer: nothing but the list above can be linked.
+        builder.symbol_lookup_fn(Box::new(|_| Some(runtime::unknown())));
+        Ok(Assembly {
+            module: JITModule::new(builder),
+            functions: BTreeMap::new(),
+            signatures,
+            routines: BTreeMap::new(),
+            places: Vec::new(),
+            known_places: BTreeMap::new(),
+            bytes: 0,
+            stack_bytes: BTreeMap::new(),
+            failure: None,
+        })
+    }
+
+    /// A compilation for the module's target.
+    #[must_use]
+    pub fn compilation(&self) -> Compilation {
+        self.module.make_context()
+    }
+
+    /// Forgets the places of the function before.
+    pub fn start_function(&mut self) {
+        self.known_places.clear();
+    }
+
+    /// Compiles a lowered function.
+    ///
+    /// # Errors
+    /// Code that Cranelift refuses.
+    pub fn define(&mut self, key: Key, compilation: &mut Compilation) -> Result<(), JitError> {
+        let id = self.declare(key).map_err(|error| self.failed(key, error))?;
+        if let Some(failure) = self.failure.take() {
+            return Err(failure);
+        }
+        let done = self.module.define_function_with_control_plane(id, compilation, &mut ControlPlane::default());
+        done.map_err(|error| JitError::Function { function: key.0, reason: format!("{error:?}") })?;
+        if let Some(compiled) = compilation.compiled_code() {
+            self.bytes += compiled.code_buffer().len();
+            // Above the frame lie the saved frame pointer, the return address and arguments that the caller pushed, which belong to the caller's frame.
+            let frame = compiled.buffer.frame_layout().map_or(0, |layout| layout.frame_to_fp_offset);
+            self.stack_bytes.insert(key, frame.saturating_add(16));
+        }
+        self.module.clear_context(compilation);
+        Ok(())
+    }
+
+    fn failed(&self, key: Key, error: String) -> JitError {
+        JitError::Function { function: key.0, reason: error }
+    }
+
+    fn declare(&mut self, key: Key) -> Result<FuncId, String> {
+        if let Some(id) = self.functions.get(&key) {
+            return Ok(*id);
+        }
+        let signature = (self.signatures)(key);
+        let id = self.module.declare_anonymous_function(&signature).map_err(|error| error.to_string())?;
+        self.functions.insert(key, id);
+        Ok(id)
+    }
+
+    /// Bytes of native stack of each function.
+    #[must_use]
+    pub fn stack_bytes(&self) -> &BTreeMap<Key, u32> {
+        &self.stack_bytes
+    }
+
+    /// Makes the code executable, and no longer writable.
+    ///
+    /// # Errors
+    /// Memory that can not be protected.
+    pub fn finish(mut self) -> Result<Code, JitError> {
+        self.module.finalize_definitions().map_err(|error| JitError::Memory(error.to_string()))?;
+        let address = |id: &FuncId| self.module.get_finalized_function(*id);
+        let addresses = self.functions.iter().map(|(key, id)| (*key, address(id))).collect();
+        Ok(Code { module: Some(self.module), places: self.places, addresses, bytes: self.bytes })
+    }
+}
+
+impl Linker for Assembly {
+    fn function(&mut self, into: &mut ir::Function, id: FunctionId, program: ProgramMemory) -> ir::FuncRef {
+        match self.declare((id, program)) {
+            Ok(declared) => self.module.declare_func_in_func(declared, into),
+            Err(error) => {
+                self.failure = Some(self.failed((id, program), error));
+                ir::FuncRef::from_u32(0)
+            }
+        }
+    }
+
+    fn routine(&mut self, into: &mut ir::Function, name: &'static str, signature: &Signature) -> ir::FuncRef {
+        let declared = match self.routines.get(name) {
+            Some(id) => Ok(*id),
+            None => self.module.declare_function(name, Linkage::Import, signature),
+        };
+        match declared {
+            Ok(id) => {
+                self.routines.insert(name, id);
+                self.module.declare_func_in_func(id, into)
+            }
+            Err(error) => {
+                self.failure = Some(JitError::Host(error.to_string()));
+                ir::FuncRef::from_u32(0)
+            }
+        }
+    }
+
+    fn place(&mut self, places: &[PlaceData], place: Place) -> u32 {
+        if let Some(known) = self.known_places.get(&place) {
+            return *known;
+        }
+        let data = places[place.index()];
+        // Inlining nests at most as deep as calls may.
+        let caller = data.caller.map(|caller| self.place(places, caller));
+        let entry = PlaceEntry { place: CodePlace { function: data.function, offset: data.offset }, caller };
+        self.places.push(entry);
+        let number = self.places.len() as u32 - 1;
+        self.known_places.insert(place, number);
+        number
+    }
+}

@@ -1,0 +1,220 @@
+//! The engine: compiling a plan, and running entries.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use cranelift_codegen::isa::OwnedTargetIsa;
+use cranelift_frontend::FunctionBuilderContext;
+use khz_bytecode::ids::FunctionId;
+use khz_bytecode::trap::TrapCode;
+use khz_machine::engine::{Engine, Entry, Limits};
+use khz_machine::image::Image;
+use khz_machine::instance_map::InstanceMap;
+use khz_machine::trap::{CodePlace, Trap};
+use std::ops::Range;
+
+use crate::build::{ProgramMemory, Scope, build};
+use crate::code::{Assembly, Code, Handle, Key, host_isa};
+use crate::context::{Context, OUT_OF_FUEL};
+use crate::lower::{Settings, lower, signature};
+use crate::plan::{EntryPoint, Plan};
+use crate::runtime::{VirtualEntry, Virtuals};
+use crate::{JitError, JitOptions, MAX_STACK_BYTES, passes};
+
+/// What lowering needs to know of a target.
+pub(crate) fn settings_for(isa: &OwnedTargetIsa, plan: &Plan, options: JitOptions) -> Settings {
+    Settings {
+        convention: isa.default_call_conv(),
+        fuel: options.fuel,
+        depth: plan.calls_virtual,
+        native_nan: matches!(isa.triple().architecture, target_lexicon::Architecture::X86_64),
+    }
+}
+
+/// Signatures of everything in a plan, by function.
+pub(crate) fn signatures(
+    scope: &Scope<'_>,
+    plan: &Plan,
+    convention: cranelift_codegen::isa::CallConv,
+) -> BTreeMap<Key, cranelift_codegen::ir::Signature> {
+    plan.functions.keys().map(|key| (*key, signature(scope, key.0, key.1, convention))).collect()
+}
+
+/// A module that knows the signatures of a plan's functions.
+pub(crate) fn assembly(scope: &Scope<'_>, plan: &Plan, isa: OwnedTargetIsa) -> Result<Assembly, JitError> {
+    let convention = isa.default_call_conv();
+    let known = signatures(scope, plan, convention);
+    let signature = move |key: Key| {
+        known.get(&key).cloned().unwrap_or_else(|| cranelift_codegen::ir::Signature::new(convention))
+    };
+    Assembly::new(isa, plan.instructions, Box::new(signature))
+}
+
+/// Compiles a plan; gives the code and the bytes of native stack that its deepest nesting of calls may need.
+pub(crate) fn compile(scope: &Scope<'_>, plan: &Plan, options: JitOptions) -> Result<(Code, u64), JitError> {
+    let isa = host_isa(options.verify_ir)?;
+    let settings = settings_for(&isa, plan, options);
+    let mut assembly = assembly(scope, plan, isa)?;
+    let mut compilation = assembly.compilation();
+    let mut builder_context = FunctionBuilderContext::new();
+    for key in plan.functions.keys() {
+        let mut function = build(scope, key.0, key.1);
+        passes::run(&mut function, scope.verified, options.passes);
+        assembly.start_function();
+        lower(scope, &function, key.1, settings, &mut assembly, &mut compilation.func, &mut builder_context);
+        assembly.define(*key, &mut compilation)?;
+    }
+    let needed_bytes = stack_bytes(scope, plan, assembly.stack_bytes());
+    if needed_bytes > MAX_STACK_BYTES {
+        return Err(JitError::Stack { needed_bytes, limit_bytes: MAX_STACK_BYTES });
+    }
+    Ok((assembly.finish()?, needed_bytes))
+}
+
+/// What the deepest nesting of calls may take of a thread's stack: the longest chain of direct calls, or, where virtual calls may recurse, the
+/// largest frame as often as calls may nest.
+fn stack_bytes(scope: &Scope<'_>, plan: &Plan, frames: &BTreeMap<Key, u32>) -> u64 {
+    // What a call pushes: its arguments and results, at most 16 bytes each.
+    let of = |key: &Key| {
+        let function = &scope.verified.container().functions[key.0.index()];
+        let pushed = function.parameter_types().len() + function.results.len() + 8;
+        u64::from(frames.get(key).copied().unwrap_or(0)) + 16 * pushed as u64
+    };
+    if plan.calls_virtual {
+        let largest = plan.functions.keys().map(of).max().unwrap_or(0);
+        return largest * u64::from(scope.verified.container().parameters.max_call_depth);
+    }
+    // Direct calls form no cycle: a callee's chain is shorter, so ascending order has it ready.
+    let mut order: Vec<&Key> = plan.functions.keys().collect();
+    order.sort_by_key(|key| scope.verified.function(key.0).call_depth);
+    let mut chains: BTreeMap<Key, u64> = BTreeMap::new();
+    for key in order {
+        let callees = plan.functions.get(key).into_iter().flatten();
+        let deepest = callees.filter_map(|callee| chains.get(callee)).max().copied().unwrap_or(0);
+        chains.insert(*key, deepest + of(key));
+    }
+    chains.into_values().max().unwrap_or(0)
+}
+
+/// The native-code engine of one resource.
+#[derive(Debug)]
+pub struct Jit {
+    init: Option<Handle>,
+    startup: Option<Handle>,
+    instances: Vec<Handle>,
+    virtuals: Box<Virtuals>,
+    frames: Vec<Range<u32>>,
+    image_bytes: u32,
+    stack_bytes: u64,
+    code: Arc<Code>,
+}
+
+impl Jit {
+    pub(crate) fn from_code(scope: &Scope<'_>, plan: &Plan, code: Arc<Code>, stack_bytes: u64) -> Result<Jit, JitError> {
+        let handle = |entry: &EntryPoint| {
+            let missing = JitError::Function { function: entry.key.0, reason: "it was not compiled".into() };
+            Handle::new(Arc::clone(&code), entry.key, entry.shared).ok_or(missing)
+        };
+        let container = scope.verified.container();
+        let entries = (0..container.functions.len()).filter_map(FunctionId::from_index).map(|function| VirtualEntry {
+            code: code.address((function, ProgramMemory::None)).unwrap_or(std::ptr::null()),
+            frame_bytes: scope.verified.function(function).frame_bytes,
+        });
+        Ok(Jit {
+            init: plan.init.as_ref().map(handle).transpose()?,
+            startup: plan.startup.as_ref().map(handle).transpose()?,
+            instances: plan.instances.iter().map(handle).collect::<Result<_, _>>()?,
+            virtuals: Box::new(Virtuals { map: InstanceMap::new(container), entries: entries.collect() }),
+            frames: scope.layout.frames.clone(),
+            image_bytes: scope.layout.total_bytes(),
+            stack_bytes,
+            code,
+        })
+    }
+
+    /// Bytes of native stack that the deepest nesting of calls may need, at most [`MAX_STACK_BYTES`].
+    #[must_use]
+    pub fn stack_bytes(&self) -> u64 {
+        self.stack_bytes
+    }
+
+    fn handle(&self, entry: Entry) -> Option<&Handle> {
+        match entry {
+            Entry::Init => self.init.as_ref(),
+            Entry::Startup => self.startup.as_ref(),
+            Entry::Instance(position) => self.instances.get(position),
+        }
+    }
+
+    /// The trap that a run recorded.
+    fn trap(&self, context: &Context) -> Trap {
+        let code = if context.trap_code == OUT_OF_FUEL { TrapCode::Watchdog as u32 } else { context.trap_code };
+        let code = u8::try_from(code).ok().and_then(TrapCode::from_code).unwrap_or(TrapCode::Stopped);
+        let (place, mut caller) = self.place(context.trap_place);
+        let mut trap = Trap::new(code, place, context.trap_values);
+        let recorded = (context.chain_len as usize).min(context.chain.len() - 1);
+        let mut calls = context.chain[..recorded].iter();
+        loop {
+            // Inlined calls lie between a place and the call that is recorded next.
+            while let Some(inlined) = caller {
+                let (place, outer) = self.place(inlined);
+                trap.push_caller(place);
+                caller = outer;
+            }
+            let Some(call) = calls.next() else { return trap };
+            let (place, outer) = self.place(*call);
+            trap.push_caller(place);
+            caller = outer;
+        }
+    }
+
+    fn place(&self, number: u32) -> (CodePlace, Option<u32>) {
+        let entry = self.code.places.get(number as usize);
+        entry.map_or((CodePlace::default(), None), |entry| (entry.place, entry.caller))
+    }
+}
+
+impl Engine for Jit {
+    fn name(&self) -> &'static str {
+        "jit"
+    }
+
+    /// # Panics
+    /// When the container has no such entry, the image is not of the layout that the code was compiled for, or there is no such task.
+    fn run(&mut self, entry: Entry, image: &mut Image, limits: Limits<'_>) -> Result<(), Trap> {
+        let handle = self.handle(entry).expect("the scheduler runs only entries that the container has");
+        let frame = self.frames.get(limits.task_index).expect("the scheduler names only tasks that the container has");
+        let bytes = image.bytes_mut();
+        assert!(bytes.len() == self.image_bytes as usize, "the image is of another layout than the code");
+        let start = bytes.as_mut_ptr();
+        let mut context = Context {
+            deadline: limits.deadline.as_atomic(),
+            fuel: limits.fuel.as_ref().map_or(u64::MAX, |fuel| fuel.left),
+            depth: 1,
+            trap_code: 0,
+            trap_place: 0,
+            chain_len: 0,
+            trap_values: [0; 3],
+            frame_limit: start.wrapping_add(frame.end as usize),
+            image: start,
+            image_bytes: bytes.len() as u64,
+            virtuals: &raw const *self.virtuals,
+            found_code: std::ptr::null(),
+            found_frame_bytes: 0,
+            chain: [0; khz_bytecode::limits::MAX_TRAP_CHAIN + 1],
+        };
+        let frame = start.wrapping_add(frame.start as usize);
+        // SAFETY: the image has the size of the layout that the code was compiled for and is lent to this call alone; the deadline cell
+        // outlives it; the tables belong to this engine; entries have neither parameters nor results (the verifier's rule).
+        let status = unsafe { handle.run(&mut context, frame) };
+        let outcome = if status == 0 { Ok(()) } else { Err(self.trap(&context)) };
+        if let Some(fuel) = limits.fuel {
+            fuel.left = if context.trap_code == OUT_OF_FUEL { 0 } else { context.fuel };
+        }
+        outcome
+    }
+
+    fn code_bytes(&self) -> usize {
+        self.code.bytes()
+    }
+}
