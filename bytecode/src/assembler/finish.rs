@@ -5,7 +5,7 @@ use super::declarations::aligned;
 use super::{Kind, PendingInstance};
 use crate::container::{BlockInstance, DataVariable, Owner, ProgramInstance, ProgramType, Task, TaskExtension, Type};
 use crate::ids::{FunctionId, TaskId, TypeId};
-use crate::limits::{MAX_TYPE_DEPTH, NULL_GUARD_BYTES};
+use crate::limits::NULL_GUARD_BYTES;
 
 /// Operand stack and call depth of a text that names none: enough for any text by hand.
 const DEFAULT_DEPTH: u16 = 64;
@@ -13,8 +13,6 @@ const DEFAULT_DEPTH: u16 = 64;
 const DEFAULT_FRAME_BYTES: u32 = 4096;
 /// Interval of the task of a text that names none, as in the reference design's default configuration.
 const DEFAULT_INTERVAL_US: u64 = 10_000;
-/// Most rows that arrays of blocks may unfold to.
-const MAX_BLOCK_ROWS: usize = 4096;
 
 impl Assembler {
     /// A program type for a `main` without one.
@@ -94,11 +92,9 @@ impl Assembler {
             self.container.tasks.instances.push(instance);
         }
         if !explicit {
-            let mut rows = std::mem::take(&mut self.container.types.block_instances);
             for variable in global_data {
-                self.block_rows(variable.ty, variable.offset, 0, true, &mut rows)?;
+                self.add_block_rows(variable.ty, variable.offset);
             }
-            self.container.types.block_instances = rows;
         }
         Ok(())
     }
@@ -109,63 +105,15 @@ impl Assembler {
         let size = self.extent(block).map_or(0, |extent| extent.0);
         self.data_end = offset.checked_add(size).ok_or("the data region is too large")?;
         self.container.types.data.push(DataVariable { offset, ty: block, constant: false });
-        let mut rows = std::mem::take(&mut self.container.types.block_instances);
-        rows.push(BlockInstance { offset, stride: size, count: 1, ty: block });
-        self.block_rows(block, offset, 0, false, &mut rows)?;
-        self.container.types.block_instances = rows;
+        self.container.types.block_instances.push(BlockInstance { offset, stride: size, count: 1, ty: block });
+        self.add_block_rows(block, offset);
         Ok(())
     }
 
-    /// Rows of the function blocks in a variable, outer before inner; `own`: a row for the variable itself, too.
-    fn block_rows(
-        &self,
-        ty: TypeId,
-        offset: u32,
-        depth: usize,
-        own: bool,
-        rows: &mut Vec<BlockInstance>,
-    ) -> Result<(), String> {
-        if depth > MAX_TYPE_DEPTH {
-            return Err("types are nested too deeply".to_string());
-        }
-        let record = match self.container.types.types.get(ty.index()) {
-            Some(Type::Block { record, .. }) => {
-                if own {
-                    rows.push(BlockInstance { offset, stride: record.size, count: 1, ty });
-                }
-                record
-            }
-            Some(Type::Struct(record) | Type::Union(record)) => record,
-            Some(Type::Array(array)) => return self.array_rows(array.index(), offset, depth, rows),
-            _ => return Ok(()),
-        };
-        if rows.len() > MAX_BLOCK_ROWS {
-            return Err("there are too many block instances; list them with block_instance".to_string());
-        }
-        for field in &record.fields {
-            self.block_rows(field.ty, offset.saturating_add(field.offset), depth + 1, true, rows)?;
-        }
-        Ok(())
-    }
-
-    fn array_rows(&self, array: usize, offset: u32, depth: usize, rows: &mut Vec<BlockInstance>) -> Result<(), String> {
-        let Some(array) = self.container.types.arrays.get(array) else { return Ok(()) };
-        let lengths = array.dimensions.iter().map(|(lower, upper)| i64::from(*upper) - i64::from(*lower) + 1);
-        let count = lengths.fold(1_i64, i64::saturating_mul);
-        let count = u32::try_from(count).unwrap_or(0);
-        if matches!(self.container.types.types.get(array.element.index()), Some(Type::Block { .. })) {
-            rows.push(BlockInstance { offset, stride: array.stride, count, ty: array.element });
-        }
-        // An element without blocks adds nothing, and then neither does the next.
-        for index in 0..count {
-            let before = rows.len();
-            let at = offset.saturating_add(array.stride.saturating_mul(index));
-            self.block_rows(array.element, at, depth + 1, false, rows)?;
-            if rows.len() == before {
-                break;
-            }
-        }
-        Ok(())
+    /// The rows that the verifier expects for a variable. Types that break a rule have none: the verifier says so itself.
+    fn add_block_rows(&mut self, ty: TypeId, offset: u32) {
+        let rows = crate::verify::block_rows(&self.container.types, ty, offset);
+        self.container.types.block_instances.extend(rows.unwrap_or_default());
     }
 
     fn budgets(&mut self) {

@@ -134,3 +134,38 @@ fn hostile_text_does_not_panic() {
         let _ = assemble(&text);
     }
 }
+
+#[test]
+fn the_example_of_the_docs_verifies() {
+    if let Err(error) = crate::verify::verify(assemble(EXAMPLE).unwrap()) {
+        panic!("{error}");
+    }
+}
+
+#[test]
+fn switch_targets_raw_offsets_and_raw_bytes_round_trip() {
+    let text = "function main\n const.i32 1\n switch a b a\na:\n jump @3\nb:\n return\n bytes ffff01\nend";
+    let c = assemble(text).unwrap();
+    let listing = disassemble(&c);
+    // const.i32 6, switch 2 + 4 + 3 * 4, jump 6.
+    assert!(listing.contains("switch L24 L30 L24\nL24:\n  jump @3\nL30:\n  return\n  bytes ffff01\nend"), "{listing}");
+    assert_eq!(assemble(&listing).unwrap(), c);
+}
+
+#[test]
+fn types_that_share_parts_do_not_take_forever() {
+    let mut text = String::from("type t0 scalar i32\n");
+    for level in 1..60 {
+        text.push_str(&format!("type t{level} struct size 8 align 4 0:t{0} 0:t{0}\n", level - 1));
+    }
+    text.push_str("type self struct size 8 align 4 0:self 0:self\ndata x t59\ndata y self\n");
+    assert_eq!(assemble(&text).unwrap().types.block_instances, []);
+}
+
+#[test]
+fn comments_name_the_source_places() {
+    let text = "function main\n nop\n return\nend\ndebug\n file \"a.st\"\n line main 2 0 7 3\n function \"Main\"\nend";
+    let c = assemble(text).unwrap();
+    let listing = crate::disassembler::disassemble_function(&c, crate::ids::FunctionId(0)).unwrap();
+    assert_eq!(listing, "function f0 program 0 ; Main\n  nop\n  return  ; a.st:7:3\nend\n");
+}

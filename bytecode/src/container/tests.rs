@@ -139,6 +139,7 @@ fn generated_containers_round_trip_through_bytes_and_text() {
         let container = generate::container(seed);
         let bytes = write(&container).unwrap();
         assert_eq!(read(&bytes).unwrap(), container, "seed {seed}");
+        let _ = crate::verify::verify(container.clone());
         let text = disassemble(&container);
         match assemble(&text) {
             Ok(again) => assert_eq!(again, container, "seed {seed}\n{text}"),
@@ -185,6 +186,8 @@ fn a_flipped_bit_behind_fresh_hashes_is_refused_or_has_one_spelling() {
             match read(&flipped) {
                 Ok(container) => {
                     assert_eq!(write(&container).unwrap(), flipped, "bit {bit}");
+                    // The verifier meets each of them without a panic, too.
+                    let _ = crate::verify::verify(container.clone());
                     if bit % 16 == 0 {
                         let text = disassemble(&container);
                         assert_eq!(assemble(&text).unwrap(), container, "bit {bit}\n{text}");
