@@ -50,6 +50,8 @@ impl StopHandle {
     /// Forgets the requests, for the next run.
     pub fn clear(&self) {
         self.0.requests.store(0, Ordering::SeqCst);
+        // The monitor forgets when the first one came.
+        self.notify();
     }
 
     /// Wakes every sleeper so that it looks again. Async-signal-safe.
