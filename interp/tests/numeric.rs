@@ -142,6 +142,7 @@ fn every_comparison_branches_as_it_means() {
 #[test]
 fn an_interpreter_says_how_large_its_code_is() {
     let small = load("function main\nreturn\nend\n", false).engine.code_bytes();
-    let large = load("global x i32\nfunction main\nslot.load g x\nconst.i32 1\ni32.add\nslot.store g x\nreturn\nend\n", false);
+    let large =
+        load("global x i32\nfunction main\nslot.load g x\nconst.i32 1\ni32.add\nslot.store g x\nreturn\nend\n", false);
     assert!(small > 0 && large.engine.code_bytes() > small);
 }
