@@ -90,7 +90,13 @@ struct ModelTask {
 }
 
 impl ModelTask {
-    /// Points neither served nor lost lie at the front. Returns (runs, due, lost).
+    fn new(state: &TaskState) -> Self {
+        let interval = if let Trigger::Cyclic { interval, .. } = state.trigger { interval.0 } else { 1 };
+        let grid = (0..3000 / interval).map(|k| state.next_due.0 + k * interval).collect();
+        ModelTask { state: *state, grid, previous: false }
+    }
+
+    /// Points neither served nor lost lie at the front. Returns its due time and the points lost, if it runs.
     fn round(&mut self, now: u64, single: bool) -> Option<(Option<u64>, u64)> {
         let rise = single && !self.previous;
         let fall = !single && self.previous;
@@ -124,27 +130,25 @@ impl ModelTask {
     }
 }
 
+fn random_tasks(numbers: &mut Numbers) -> Vec<TaskState> {
+    let mut states = Vec::new();
+    for _ in 0..1 + numbers.below(6) {
+        let priority = numbers.below(3) as u16;
+        states.push(match numbers.below(4) {
+            0 => other(Trigger::Event, priority),
+            1 => other(Trigger::Freewheeling, priority),
+            kind => cyclic(1 + numbers.below(20), numbers.below(15), kind == 2, priority),
+        });
+    }
+    states
+}
+
 #[test]
 fn decisions_agree_with_a_brute_force_model() {
     for seed in 0..400 {
         let mut numbers = Numbers(seed);
-        let mut states = Vec::new();
-        for _ in 0..1 + numbers.below(6) {
-            let priority = numbers.below(3) as u16;
-            states.push(match numbers.below(4) {
-                0 => other(Trigger::Event, priority),
-                1 => other(Trigger::Freewheeling, priority),
-                kind => cyclic(1 + numbers.below(20), numbers.below(15), kind == 2, priority),
-            });
-        }
-        let mut model: Vec<ModelTask> = states
-            .iter()
-            .map(|state| {
-                let interval = if let Trigger::Cyclic { interval, .. } = state.trigger { interval.0 } else { 1 };
-                let grid = (0..3000 / interval).map(|k| state.next_due.0 + k * interval).collect();
-                ModelTask { state: *state, grid, previous: false }
-            })
-            .collect();
+        let states = random_tasks(&mut numbers);
+        let mut model: Vec<ModelTask> = states.iter().map(ModelTask::new).collect();
         let mut set = TaskSet::from_states(&states);
         let mut now = 0;
         let mut ready = Vec::new();
