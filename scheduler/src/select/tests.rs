@@ -92,7 +92,7 @@ struct ModelTask {
 impl ModelTask {
     fn new(state: &TaskState) -> Self {
         let interval = if let Trigger::Cyclic { interval, .. } = state.trigger { interval.0 } else { 1 };
-        let grid = (0..3000 / interval).map(|k| state.next_due.0 + k * interval).collect();
+        let grid = (0..10_000 / interval).map(|k| state.next_due.0 + k * interval).collect();
         ModelTask { state: *state, grid, previous: false }
     }
 
