@@ -18,6 +18,8 @@ pub const MAX_TYPE_DEPTH: usize = 64;
 pub const MAX_UNION_ALTERNATIVES: u32 = 256;
 /// Deepest nesting of loops in a function.
 pub const MAX_LOOP_DEPTH: u16 = 64;
+/// Most results of a function.
+pub const MAX_RESULTS: usize = 1024;
 /// Most `l` slots that hold references beside the parameters of one function.
 pub const MAX_REFERENCE_LOCALS: usize = 1024;
 /// Most function block instances that the verifier lists one by one, and most steps of a proof that need not succeed.

@@ -30,6 +30,7 @@ fn size(instructions: &[Instruction]) -> u32 {
     encode(instructions).len() as u32
 }
 
+#[allow(clippy::disallowed_methods, reason = "a test that bounds real time")]
 fn timed(container: Container) -> Result<Verified, VerifyError> {
     let start = Instant::now();
     let result = verify(container);

@@ -152,6 +152,9 @@ impl Proof<'_, '_, '_> {
         if place.is_image() {
             return true;
         }
+        if place == BytePlace::Frame && matches!(known.place, BytePlace::Data | BytePlace::Block) {
+            return true;
+        }
         let own = match self.scope.function.owner {
             Owner::None => 0,
             Owner::Program(program) => program.0,

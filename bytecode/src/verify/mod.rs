@@ -28,6 +28,7 @@ pub mod facts;
 pub mod rules;
 
 mod calls;
+mod document;
 mod error;
 mod flow;
 mod for_proof;
@@ -38,6 +39,7 @@ mod touch;
 mod types;
 mod typing;
 
+pub use document::rules_document;
 pub use error::{TableEntry, VerifyError};
 pub use facts::*;
 pub use rules::{Rule, RuleGroup};

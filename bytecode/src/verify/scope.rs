@@ -6,7 +6,7 @@ use super::tasks::image_size;
 use super::types::{TypeTable, Wanted};
 use crate::container::{Container, ControlPlace, ForLoop, Function, Owner, ProgramType, Type};
 use crate::ids::{FunctionId, MethodId, SlotIndex, TypeId};
-use crate::limits::MAX_REFERENCE_LOCALS;
+use crate::limits::{MAX_REFERENCE_LOCALS, MAX_RESULTS};
 use crate::value::{BytePlace, LocalType, RefType, SlotPlace, Storage, ValueType};
 
 /// A broken rule whose place the caller adds.
@@ -52,6 +52,10 @@ impl<'a, 'c> Scope<'a, 'c> {
         }
         if let Some(at) = function.locals.iter().position(|local| !types.local_is_valid(*local)) {
             return error(Rule::FunctionLocals, format!("local {at} refers to a type that does not exist"));
+        }
+        if function.results.len() > MAX_RESULTS {
+            let message = format!("{} results; at most {MAX_RESULTS} are allowed", function.results.len());
+            return error(Rule::FunctionLocals, message);
         }
         let references = function.locals.iter().skip(parameters).filter(|l| matches!(l, LocalType::Ref(_))).count();
         if references > MAX_REFERENCE_LOCALS {
@@ -207,6 +211,7 @@ fn describe(wanted: Wanted) -> String {
 
 /// Checks the methods of function block types against functions and signatures.
 pub(super) fn check_methods(container: &Container, types: &TypeTable<'_>) -> Check {
+    let mut compared = std::collections::BTreeSet::new();
     for (index, ty) in container.types.types.iter().enumerate() {
         let Type::Block { methods, .. } = ty else { continue };
         let mut last: Option<MethodId> = None;
@@ -226,7 +231,9 @@ pub(super) fn check_methods(container: &Container, types: &TypeTable<'_>) -> Che
             if !matches!(found.owner, Owner::Block(owner) if types.derives_from(own, owner)) {
                 return error(format!("function {function} of method {method} belongs to another type"));
             }
-            if found.parameter_types() != signature.parameters || found.results != signature.results {
+            // A pair may stand in many types; its signature is compared once.
+            let is_new = compared.insert((*method, *function));
+            if is_new && (found.parameter_types() != signature.parameters || found.results != signature.results) {
                 return error(format!(
                     "function {function} does not have the parameters and results of method {method}"
                 ));

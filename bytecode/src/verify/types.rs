@@ -5,7 +5,7 @@ use super::facts::Extent;
 use super::rules::Rule;
 use crate::container::{ArrayDescriptor, BlockInstance, DataVariable, Record, Type, TypeSection};
 use crate::ids::TypeId;
-use crate::limits::{MAX_DIMENSIONS, MAX_STRING_LENGTH, MAX_TYPE_DEPTH, MAX_UNION_ALTERNATIVES};
+use crate::limits::{MAX_DIMENSIONS, MAX_RESULTS, MAX_STRING_LENGTH, MAX_TYPE_DEPTH, MAX_UNION_ALTERNATIVES};
 use crate::value::{LocalType, Storage};
 
 /// What is known of one type beside its extent.
@@ -70,6 +70,10 @@ impl<'c> TypeTable<'c> {
 
     fn check_signatures(&self) -> Check {
         for (index, method) in self.section.methods.iter().enumerate() {
+            if method.results.len() > MAX_RESULTS {
+                let message = format!("{} results; at most {MAX_RESULTS} are allowed", method.results.len());
+                return Err(VerifyError::entry(Rule::MethodSignature, "method", index, message));
+            }
             for parameter in &method.parameters {
                 if !self.local_is_valid(*parameter) {
                     let message = "a parameter refers to a type that does not exist";

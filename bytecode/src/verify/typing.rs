@@ -71,9 +71,9 @@ pub(super) fn type_function(
         typer.block_start = block.start;
         typer.stack.clear();
         typer.stack.extend(block.entry_stack.iter().map(|ty| Entry { ty: *ty, origin: None }));
-        for at in block.start..block.end {
-            typer.at = at;
-            typer.step(&instructions[at].instruction).map_err(|broken| typer.error(broken))?;
+        for (inside, placed) in instructions[block.start..block.end].iter().enumerate() {
+            typer.at = block.start + inside;
+            typer.step(&placed.instruction).map_err(|broken| typer.error(broken))?;
         }
         let mut successors = block.successors.clone();
         successors.sort_unstable();
