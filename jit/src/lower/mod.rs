@@ -167,7 +167,9 @@ impl Lowerer<'_, '_> {
         self.add_parameters();
         for number in 0..self.function.blocks.len() {
             let data = &self.function.blocks[number];
-            self.builder.switch_to_block(self.blocks[number]);
+            if number > 0 {
+                self.builder.switch_to_block(self.blocks[number]);
+            }
             self.write_back = data.write_back;
             for instruction in &data.instructions {
                 self.place = instruction.place;
