@@ -126,7 +126,7 @@ pub fn print_diagnostics(diagnostics: &[Diagnostic], sources: &SourceMap, format
         return;
     }
     for diagnostic in diagnostics {
-        people(render::render(diagnostic, sources, colours()).trim_end());
+        people(render::render(diagnostic, sources, render::Style { colour: colours() }).trim_end());
     }
 }
 
