@@ -136,10 +136,10 @@ impl Translator<'_> {
     pub(super) fn for_next(&mut self, id: ForId, header: Label) {
         self.settle_all();
         let block = self.block_at(header);
-        let skip = u32::from(self.header_fuel[block].is_some());
+        let header = self.header_loops[block];
+        let skip = u32::from(header.is_some());
         let access = self.for_access(id);
-        let mut loops = self.facts.loops.iter().filter(|l| l.header.index() == block);
-        let is_for_loop = loops.next().is_some_and(|l| l.for_loop == Some(id));
+        let is_for_loop = header.is_some_and(|l| l.for_loop == Some(id));
         let code = match access.kind {
             IntegerType::I32 => Some(Code::ForNextI32),
             IntegerType::I16 => Some(Code::ForNextI16),

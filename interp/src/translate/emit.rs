@@ -109,7 +109,7 @@ impl Translator<'_> {
             return;
         }
         // A jump back goes to a loop header: it does the header's check itself.
-        let back = block <= self.block && self.header_fuel[block].is_some();
+        let back = block <= self.block && self.header_loops[block].is_some();
         let code = if back { Code::Repeat } else { Code::Jump };
         self.branch_to(Operation { code, x: 0, dst: 0, a: 0, b: 0 }, block, u32::from(back));
     }

@@ -176,11 +176,9 @@ impl Translator<'_> {
     }
 
     pub(super) fn ref_field(&mut self, owner: TypeId, field: u16) {
-        let record = match &self.verified.container().types.types[owner.index()] {
-            Type::Struct(record) | Type::Union(record) | Type::Block { record, .. } => record,
-            // The verifier lets only records have fields.
-            _ => return,
-        };
+        let ty = &self.verified.container().types.types[owner.index()];
+        // The verifier lets only records have fields.
+        let (Type::Struct(record) | Type::Union(record) | Type::Block { record, .. }) = ty else { return };
         let offset = record.fields[usize::from(field)].offset;
         let (entry, _) = self.pop();
         let value = match entry.value {

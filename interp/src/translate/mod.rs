@@ -19,7 +19,7 @@ use khz_bytecode::container::{Function, Owner};
 use khz_bytecode::ids::{FunctionId, SlotIndex};
 use khz_bytecode::instruction::Instruction;
 use khz_bytecode::value::{LocalType, SlotPlace, StackType, Storage};
-use khz_bytecode::verify::{BasicBlock, FunctionFacts, Verified};
+use khz_bytecode::verify::{BasicBlock, FunctionFacts, Loop, Verified};
 use khz_machine::image::ImageLayout;
 
 use crate::register_form::{Code, FunctionEntry, Operation, Program};
@@ -72,13 +72,13 @@ impl FunctionRegisters {
     }
 }
 
-/// The fuel of a pass for blocks that are loop headers.
-fn header_fuel(facts: &FunctionFacts) -> Vec<Option<u32>> {
-    let mut fuel = vec![None; facts.blocks.len()];
+/// For blocks that are loop headers their loop.
+fn header_loops(facts: &FunctionFacts) -> Vec<Option<&Loop>> {
+    let mut loops = vec![None; facts.blocks.len()];
     for l in &facts.loops {
-        fuel[l.header.index()] = Some(l.fuel);
+        loops[l.header.index()] = Some(l);
     }
-    fuel
+    loops
 }
 
 /// Translates one function.
@@ -101,8 +101,8 @@ struct Translator<'a> {
     next: Option<&'a Instruction>,
     /// Block that is being translated.
     block: usize,
-    /// For blocks that are loop headers the fuel of a pass.
-    header_fuel: Vec<Option<u32>>,
+    /// For blocks that are loop headers their loop.
+    header_loops: Vec<Option<&'a Loop>>,
     /// What is known of each FOR loop's step.
     steps: Vec<Step>,
     /// Position of each block's first operation.
@@ -135,7 +135,7 @@ impl<'a> Translator<'a> {
             origin: 0,
             next: None,
             block: 0,
-            header_fuel: header_fuel(facts),
+            header_loops: header_loops(facts),
             steps: control::awaited_steps(function.for_loops.len(), facts),
             block_starts: vec![0; facts.blocks.len()],
             patches: Vec::new(),
@@ -197,10 +197,10 @@ impl<'a> Translator<'a> {
         }
         let placed = &self.facts.instructions[block.start..block.end];
         self.origin = placed.first().map_or(0, |first| first.offset);
-        if let Some(fuel) = self.header_fuel[self.block] {
+        if let Some(header) = self.header_loops[self.block] {
             self.effect(Operation { code: Code::Header, x: 0, dst: 0, a: 0, b: 0 });
             if self.fuel {
-                self.effect(Operation { code: Code::Charge, x: 0, dst: 0, a: fuel, b: 0 });
+                self.effect(Operation { code: Code::Charge, x: 0, dst: 0, a: header.fuel, b: 0 });
             }
         }
         for (index, instruction) in placed.iter().enumerate() {
