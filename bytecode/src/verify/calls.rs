@@ -50,7 +50,7 @@ pub(super) fn callees_first(drafts: &[Draft]) -> Check<(Vec<FunctionId>, Vec<Vec
 
 fn callees(draft: &Draft) -> Vec<FunctionId> {
     let calls = draft.touches.iter().filter_map(|touch| match touch.kind {
-        TouchKind::Call(id) => Some(id),
+        TouchKind::Call { function, .. } => Some(function),
         _ => None,
     });
     let unique: BTreeSet<FunctionId> = calls.collect();
@@ -124,7 +124,9 @@ pub(super) fn close(
         if entries > MAX_ANALYSIS_ENTRIES {
             return Err(too_many());
         }
+        let confined = own_callees.iter().all(|callee| facts[callee.index()].is_confined);
         let facts = &mut facts[id.index()];
+        facts.is_confined = confined && !drafts[id.index()].reaches_out;
         facts.call_depth = depth + 1;
         // Both are below the limit, which is a u32.
         facts.frame_bytes = frame as u32;
@@ -203,7 +205,7 @@ fn own_effects(function: &Function, draft: &Draft) -> Effects {
                 // A reference that `address` made in this function was not made from an integer.
                 effects.raw_writes |= reference.image && origin.is_none();
             }
-            TouchKind::Call(_) => {}
+            TouchKind::Call { .. } => {}
             TouchKind::CallVirtual(method) => _ = effects.virtual_calls.insert(method),
         }
     }

@@ -101,6 +101,9 @@ pub struct FunctionFacts {
     pub entry_fuel: u32,
     /// Whether it, or a function it calls, may call virtually.
     pub calls_virtual: bool,
+    /// Whether all that it and its callees write in d, b, t and f lies in their own frames, in `this`, or in the targets of
+    /// writable references passed to it: it makes no reference to other variables and calls nothing virtually.
+    pub is_confined: bool,
 }
 
 /// A run of instructions that is entered only at its start and left only at its end.

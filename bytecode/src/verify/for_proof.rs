@@ -6,8 +6,9 @@
 
 use super::facts::{Effects, FunctionFacts, KnownPlace};
 use super::scope::Scope;
-use super::touch::{Touch, TouchKind};
+use super::touch::TouchKind;
 use super::types::Wanted;
+use super::typing::Draft;
 use crate::container::{ControlPlace, ForLoop, Owner, Type};
 use crate::ids::{ForId, TypeId};
 use crate::value::{BytePlace, SlotPlace, Storage};
@@ -19,12 +20,13 @@ pub(super) fn control_is_proven(
     own: &FunctionFacts,
     number: usize,
     id: ForId,
-    touches: &[Touch],
+    draft: &Draft,
     facts: &[FunctionFacts],
     steps: &mut usize,
 ) -> bool {
     let Some(descriptor) = scope.function.for_loops.get(id.index()) else { return false };
-    let proof = Proof { scope, facts, descriptor };
+    let proof = Proof { scope, draft, facts, descriptor };
+    let touches = &draft.touches;
     own.loops[number].blocks.iter().all(|block| {
         let block = &own.blocks[block.index()];
         let first = touches.partition_point(|touch| touch.instruction < block.start);
@@ -36,7 +38,7 @@ pub(super) fn control_is_proven(
         });
         touches.all(|touch| {
             let cost = match touch.kind {
-                TouchKind::Call(callee) if matches!(descriptor.control, ControlPlace::Bytes(..)) => {
+                TouchKind::Call { function: callee, .. } if matches!(descriptor.control, ControlPlace::Bytes(..)) => {
                     let effects = &facts[callee.index()].effects;
                     1 + effects.bytes_written.len() + effects.written_through_references.len()
                 }
@@ -50,6 +52,7 @@ pub(super) fn control_is_proven(
 
 struct Proof<'s, 'a, 'c> {
     scope: &'s Scope<'a, 'c>,
+    draft: &'s Draft,
     facts: &'s [FunctionFacts],
     descriptor: &'s ForLoop,
 }
@@ -58,7 +61,7 @@ impl Proof<'_, '_, '_> {
     fn keeps(&self, touch: TouchKind) -> bool {
         match (self.descriptor.control, touch) {
             (ControlPlace::Slot(place, slot), TouchKind::SlotWrite(to, written)) => (place, slot) != (to, written),
-            (ControlPlace::Slot(place, slot), TouchKind::Call(callee)) => {
+            (ControlPlace::Slot(place, slot), TouchKind::Call { function: callee, .. }) => {
                 let effects = &self.facts[callee.index()].effects;
                 match place {
                     SlotPlace::Local => true,
@@ -89,7 +92,11 @@ impl Proof<'_, '_, '_> {
             TouchKind::ReferenceWrite { reference, origin: None } => {
                 !reference.image && !self.may_hold(reference.target)
             }
-            TouchKind::Call(callee) => self.keeps_callee(place, offset, &self.facts[callee.index()].effects),
+            TouchKind::Call { function, first, count } => {
+                let callee = &self.facts[function.index()];
+                (callee.is_confined && self.keeps_arguments(place, offset, first, count))
+                    || self.keeps_callee(place, offset, &callee.effects)
+            }
             TouchKind::CallVirtual(_) => false,
             _ => true,
         }
@@ -134,6 +141,17 @@ impl Proof<'_, '_, '_> {
             Some(Type::String { .. } | Type::WideString { .. }) => false,
             _ => true,
         }
+    }
+
+    /// Whether a confined callee, which writes only where its arguments point, misses the control variable.
+    fn keeps_arguments(&self, place: BytePlace, offset: u32, first: usize, count: usize) -> bool {
+        let arguments = self.draft.arguments.iter().skip(first).take(count);
+        let mut arguments = arguments.map(|origin| origin.as_ref());
+        // It may write %M and %Q wherever it likes.
+        !place.is_image()
+            && arguments.all(|origin| {
+                origin.is_some_and(|o| self.keeps_known(place, offset, o.place, o.start, u64::from(o.size), true))
+            })
     }
 
     fn keeps_callee(&self, place: BytePlace, offset: u32, effects: &Effects) -> bool {

@@ -145,7 +145,7 @@ fn prove_for_loops(scopes: &[Scope<'_, '_>], drafts: &[Draft], functions: &mut [
         for number in 0..functions[index].loops.len() {
             let own = &functions[index];
             let Some(id) = own.loops[number].for_loop else { continue };
-            let proven = for_proof::control_is_proven(scope, own, number, id, &draft.touches, functions, &mut steps);
+            let proven = for_proof::control_is_proven(scope, own, number, id, draft, functions, &mut steps);
             functions[index].loops[number].control_is_proven = proven;
         }
     }

@@ -27,7 +27,15 @@ pub(super) enum TouchKind {
     BytesRead(BytePlace, u32),
     BytesWrite(BytePlace, u32, Storage),
     ReferenceRead(RefType),
-    ReferenceWrite { reference: RefType, origin: Option<Origin> },
-    Call(FunctionId),
+    ReferenceWrite {
+        reference: RefType,
+        origin: Option<Origin>,
+    },
+    /// A direct call; its writable reference arguments are `Draft::arguments[first..first + count]`.
+    Call {
+        function: FunctionId,
+        first: usize,
+        count: usize,
+    },
     CallVirtual(MethodId),
 }

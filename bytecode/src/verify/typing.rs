@@ -22,6 +22,10 @@ use crate::value::{BytePlace, IntegerType, LocalType, RefType, SlotPlace, StackT
 pub(super) struct Draft {
     /// What its instructions touch, in code order.
     pub(super) touches: Vec<Touch>,
+    /// Where the writable references point that it passes to direct calls, if that is known.
+    pub(super) arguments: Vec<Option<Origin>>,
+    /// Whether it writes, or makes writable references to, variables that are neither its own nor handed to it (slots and images aside).
+    pub(super) reaches_out: bool,
     /// Deepest stack.
     pub(super) max_stack: u16,
     /// Whether an instruction of its own may trap (depth of calls aside).
@@ -222,6 +226,7 @@ impl<'s, 'a, 'c> Typer<'s, 'a, 'c> {
     }
 
     fn touch(&mut self, kind: TouchKind) {
+        self.draft.reaches_out |= matches!(kind, TouchKind::BytesWrite(BytePlace::Data | BytePlace::Block, ..));
         self.draft.touches.push(Touch { instruction: self.at, kind });
     }
 
@@ -455,6 +460,7 @@ impl<'s, 'a, 'c> Typer<'s, 'a, 'c> {
                 }
                 self.pop_value(ValueType::I64)?;
                 self.draft.foreign_floats |= write;
+                self.draft.reaches_out |= write;
                 self.push(StackType::Ref(RefType { target, write, image: true }))
             }
             Instruction::Copy { target } => {
@@ -481,6 +487,7 @@ impl<'s, 'a, 'c> Typer<'s, 'a, 'c> {
     fn address(&mut self, place: BytePlace, offset: u32, target: TypeId) -> Result<(), Broken> {
         self.type_exists(target)?;
         let write = self.scope.check_bytes(place, offset, Wanted::Type(target), false)?;
+        self.draft.reaches_out |= write && matches!(place, BytePlace::Data | BytePlace::Block);
         let origin = Some(Origin { place, start: offset, size: self.scope.types.size(target) });
         self.push_entry(Entry { ty: StackType::Ref(RefType { target, write, image: place.is_image() }), origin })
     }
@@ -536,17 +543,23 @@ impl<'s, 'a, 'c> Typer<'s, 'a, 'c> {
         if matches!(callee.owner, Owner::Program(_)) && callee.owner != self.scope.function.owner {
             return Err((Rule::CallOwner, format!("function {id} runs only on instances of its own program type")));
         }
+        let first = self.draft.arguments.len();
         for parameter in callee.parameter_types().iter().rev() {
-            self.pop_local(*parameter)?;
+            let origin = self.pop_local(*parameter)?;
+            if matches!(parameter, LocalType::Ref(reference) if reference.write) {
+                self.draft.arguments.push(origin);
+            }
         }
         if let Some(this) = Scope::this(callee) {
-            let (found, _) = self.pop_reference()?;
+            let (found, origin) = self.pop_reference()?;
+            self.draft.arguments.push(origin);
             let exact = RefType { target: this.target, ..found };
             if !self.scope.types.derives_from(found.target, this.target) || !exact.fits(this) {
                 return Err((Rule::OperandType, format!("`this` is {this}; the stack has {found}")));
             }
         }
-        self.touch(TouchKind::Call(id));
+        let count = self.draft.arguments.len() - first;
+        self.touch(TouchKind::Call { function: id, first, count });
         callee.results.iter().try_for_each(|result| self.push_value(*result))
     }
 
@@ -557,6 +570,7 @@ impl<'s, 'a, 'c> Typer<'s, 'a, 'c> {
             self.pop_local(*parameter)?;
         }
         self.pop_value(ValueType::I64)?;
+        self.draft.reaches_out = true;
         self.touch(TouchKind::CallVirtual(method));
         signature.results.iter().try_for_each(|result| self.push_value(*result))
     }
