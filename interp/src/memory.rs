@@ -4,10 +4,12 @@
 //! defence behind the verifier. Registers and operations are reached without a check in release builds, because their numbers come
 //! from this crate's own translation and never from a container; debug builds and the feature `checked` check them too.
 
-/// Whether register and operation numbers are checked.
-const CHECKED: bool = cfg!(any(debug_assertions, feature = "checked"));
+use std::marker::PhantomData;
 
 use crate::register_form::Operation;
+
+/// Whether register and operation numbers are checked.
+const CHECKED: bool = cfg!(any(debug_assertions, feature = "checked"));
 
 /// The operations of a program.
 #[derive(Clone, Copy)]
@@ -39,9 +41,14 @@ impl<'a> Code<'a> {
 }
 
 /// The register file, seen through the window of the running call.
+///
+/// The window is a pointer, so that the dispatch loop can keep it in one machine register. What is called out of line gets a
+/// [`lend`](Self::lend) of it: a reference to the loop's own would force it into memory.
 pub(crate) struct Registers<'a> {
-    file: &'a mut [u64],
-    base: usize,
+    start: *mut u64,
+    count: usize,
+    window: *mut u64,
+    file: PhantomData<&'a mut [u64]>,
 }
 
 impl<'a> Registers<'a> {
@@ -52,69 +59,83 @@ impl<'a> Registers<'a> {
     /// next `enter` or `leave`; each `leave` must go back to a base that was entered before.
     #[expect(unsafe_code, reason = "see the head of this file")]
     pub(crate) unsafe fn new(file: &'a mut [u64]) -> Self {
-        Registers { file, base: 0 }
+        let start = file.as_mut_ptr();
+        Registers { start, count: file.len(), window: start, file: PhantomData }
+    }
+
+    /// The same file and window for a function that is called meanwhile.
+    #[inline(always)]
+    pub(crate) fn lend(&mut self) -> Registers<'_> {
+        Registers { start: self.start, count: self.count, window: self.window, file: PhantomData }
     }
 
     /// Position of the window in the file.
     #[inline(always)]
     pub(crate) fn base(&self) -> usize {
-        self.base
+        (self.window.addr() - self.start.addr()) / size_of::<u64>()
     }
 
     /// Moves the window to `base`, where `count` registers are to be used. False, and nothing moved, when the file is too short.
     #[inline(always)]
     #[must_use]
+    #[expect(unsafe_code, reason = "see the head of this file")]
     pub(crate) fn enter(&mut self, base: usize, count: u32) -> bool {
-        let fits = base.saturating_add(count as usize) <= self.file.len();
+        let fits = base.saturating_add(count as usize) <= self.count;
         if fits {
-            self.base = base;
+            // SAFETY: `base` was just found to be inside the file or at its end.
+            self.window = unsafe { self.start.add(base) };
         }
         fits
     }
 
     /// Moves the window back to that of a caller.
     #[inline(always)]
+    #[expect(unsafe_code, reason = "see the head of this file")]
     pub(crate) fn leave(&mut self, base: usize) {
-        self.base = base;
+        if CHECKED {
+            assert!(base <= self.count, "a window outside the register file");
+        }
+        // SAFETY: the caller of `new` promised that this base was entered before, and `enter` checked it.
+        self.window = unsafe { self.start.add(base) };
+    }
+
+    /// A register of the window.
+    #[inline(always)]
+    #[expect(unsafe_code, reason = "see the head of this file")]
+    fn at(&self, register: u32) -> *mut u64 {
+        if CHECKED {
+            assert!(self.base() + (register as usize) < self.count, "a register outside the register file");
+        }
+        // SAFETY: `enter` checked that the window lies in the file; the caller of `new` promised that the register is in the window.
+        unsafe { self.window.add(register as usize) }
     }
 
     /// The bits in a register.
     #[inline(always)]
     #[expect(unsafe_code, reason = "see the head of this file")]
     pub(crate) fn get(&self, register: u32) -> u64 {
-        let at = self.base + register as usize;
-        if CHECKED {
-            return self.file[at];
-        }
-        // SAFETY: `enter` checked that the window lies in the file; the caller of `new` promised that the register is in the window.
-        unsafe { *self.file.get_unchecked(at) }
+        // SAFETY: `at` gives a register of the file, which this borrows for reading.
+        unsafe { *self.at(register) }
     }
 
     /// Puts bits into a register.
     #[inline(always)]
     #[expect(unsafe_code, reason = "see the head of this file")]
     pub(crate) fn set(&mut self, register: u32, bits: u64) {
-        let at = self.base + register as usize;
-        if CHECKED {
-            self.file[at] = bits;
-            return;
-        }
-        // SAFETY: as for `get`.
-        unsafe { *self.file.get_unchecked_mut(at) = bits };
+        // SAFETY: `at` gives a register of the file, which this borrows for writing.
+        unsafe { *self.at(register) = bits };
     }
 
     /// Zeroes `count` registers from `first` on.
     #[inline]
     pub(crate) fn zero(&mut self, first: u32, count: u32) {
-        let first = self.base + first as usize;
-        self.file[first..first + count as usize].fill(0);
+        (first..first + count).for_each(|register| self.set(register, 0));
     }
 
     /// Moves `count` registers from `first` on to the window's start.
     #[inline]
     pub(crate) fn move_to_start(&mut self, first: u32, count: u32) {
-        let first = self.base + first as usize;
-        self.file.copy_within(first..first + count as usize, self.base);
+        (0..count).for_each(|register| self.set(register, self.get(first + register)));
     }
 }
 

@@ -133,6 +133,8 @@ macro_rules! define_run {
             mut fuel: Option<&mut Fuel>,
         ) -> Result<(), Stop> {
             let program = surroundings.program;
+            // A copy of its own, so that the window stays in a machine register: arguments of this size arrive in memory.
+            let mut registers = registers.lend();
             let deadline: &AtomicU32 = surroundings.deadline.as_atomic();
             let mut pc = function.start as usize;
             let mut frame = surroundings.frame_start;
@@ -318,7 +320,7 @@ macro_rules! define_run {
                     }
                     Code::Helper => {
                         let capacities = program.capacities[op.b as usize];
-                        run_helper(op, capacities, memory, &mut registers);
+                        run_helper(op, capacities, memory, &mut registers.lend());
                     }
                     Code::Jump => pc = op.dst as usize,
                     Code::Repeat => {
@@ -339,13 +341,13 @@ macro_rules! define_run {
                         let case = (registers.get(op.a) as u32).min(op.dst - 1);
                         pc = program.jump_table[(op.b + case) as usize] as usize;
                     }
-                    Code::ForEnter => match enter_loop(&program.for_loops[op.a as usize], op.b, memory, &mut registers) {
+                    Code::ForEnter => match enter_loop(&program.for_loops[op.a as usize], op.b, memory, &mut registers.lend()) {
                         Some(true) => {}
                         Some(false) => pc = op.dst as usize,
                         None => stop!(TrapCode::Range, [0; 3]),
                     },
                     Code::ForNext => {
-                        if next_pass(&program.for_loops[op.a as usize], memory, &mut registers) {
+                        if next_pass(&program.for_loops[op.a as usize], memory, &mut registers.lend()) {
                             pc = op.dst as usize;
                             check_deadline!();
                         }
@@ -363,6 +365,26 @@ macro_rules! define_run {
                         let (control, bound) = (registers.get(op.a) as i32, registers.get(op.b) as i32);
                         let sum = i64::from(control) + i64::from(op.x);
                         registers.set(op.a, i32::from(sum as i16).into_bits());
+                        if if op.x > 0 { sum <= i64::from(bound) } else { sum >= i64::from(bound) } {
+                            pc = op.dst as usize;
+                            check_deadline!();
+                        }
+                    }
+                    Code::ForNextProgramI32 => {
+                        let at = (surroundings.program_base + op.a) as usize;
+                        let (control, bound) = (i32::load(memory, at) as i32, registers.get(op.b) as i32);
+                        let sum = i64::from(control) + i64::from(op.x);
+                        i32::store(memory, at, sum as u64);
+                        if if op.x > 0 { sum <= i64::from(bound) } else { sum >= i64::from(bound) } {
+                            pc = op.dst as usize;
+                            check_deadline!();
+                        }
+                    }
+                    Code::ForNextProgramI16 => {
+                        let at = (surroundings.program_base + op.a) as usize;
+                        let (control, bound) = (i16::load(memory, at) as i32, registers.get(op.b) as i32);
+                        let sum = i64::from(control) + i64::from(op.x);
+                        i16::store(memory, at, sum as u64);
                         if if op.x > 0 { sum <= i64::from(bound) } else { sum >= i64::from(bound) } {
                             pc = op.dst as usize;
                             check_deadline!();

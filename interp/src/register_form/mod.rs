@@ -104,6 +104,10 @@ macro_rules! define_code {
             ForNextI32,
             /// As `ForNextI32` for a 16-bit control variable.
             ForNextI16,
+            /// As `ForNextI32` for a control variable at offset `a` of the instance's program slots.
+            ForNextProgramI32,
+            /// As `ForNextProgramI32` for a 16-bit control variable.
+            ForNextProgramI16,
             /// Calls function `b`; its window starts at register `a`, its frame bytes `dst` bytes behind this call's.
             Call,
             /// Calls method `b` of the instance whose address is in register `a`; otherwise as `Call`.

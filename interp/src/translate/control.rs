@@ -133,6 +133,10 @@ impl Translator<'_> {
         self.branch_to(Operation { code: Code::ForEnter, x: 0, dst: 0, a, b }, block, 0);
     }
 
+    fn is_program_base(&self, register: u32) -> bool {
+        matches!(self.function.owner, Owner::Program(_)) && register == self.registers.program_base
+    }
+
     pub(super) fn for_next(&mut self, id: ForId, header: Label) {
         self.settle_all();
         let block = self.block_at(header);
@@ -140,14 +144,19 @@ impl Translator<'_> {
         let skip = u32::from(header.is_some());
         let access = self.for_access(id);
         let is_for_loop = header.is_some_and(|l| l.for_loop == Some(id));
-        let code = match access.kind {
-            IntegerType::I32 => Some(Code::ForNextI32),
-            IntegerType::I16 => Some(Code::ForNextI16),
+        let fast = match (access.kind, access.control) {
+            (IntegerType::I32, Control::Register(a)) => Some((Code::ForNextI32, a)),
+            (IntegerType::I16, Control::Register(a)) => Some((Code::ForNextI16, a)),
+            // Only program slots are reached through that base.
+            (IntegerType::I32, Control::Based(base, a)) if self.is_program_base(base) => {
+                Some((Code::ForNextProgramI32, a))
+            }
+            (IntegerType::I16, Control::Based(base, a)) if self.is_program_base(base) => {
+                Some((Code::ForNextProgramI16, a))
+            }
             _ => None,
         };
-        if let (true, Some(code), Control::Register(a), Step::Constant(x)) =
-            (is_for_loop, code, access.control, self.steps[id.index()])
-        {
+        if let (true, Some((code, a)), Step::Constant(x)) = (is_for_loop, fast, self.steps[id.index()]) {
             let operation = Operation { code, x, dst: 0, a, b: access.bound };
             return self.branch_to(operation, block, skip);
         }
