@@ -257,11 +257,12 @@ impl Generator {
         let fitting: Vec<&str> = SCALARS.into_iter().filter(|storage| value_type(storage) == ty).collect();
         let storage = fitting[self.below(fitting.len())];
         let number = self.below(2);
-        match self.below(if self.in_function { 3 } else { 4 }) {
+        match self.below(7) {
             0 => (format!("slot.load g g_{storage}{number}"), format!("slot.store g g_{storage}{number}")),
             1 => (format!("load d {storage} d_{storage}"), format!("store d {storage} d_{storage}")),
-            2 => (format!("slot.load l l_{storage}{number}"), format!("slot.store l l_{storage}{number}")),
-            _ => (format!("slot.load p p_{storage}"), format!("slot.store p p_{storage}")),
+            2 if !self.in_function => (format!("slot.load p p_{storage}"), format!("slot.store p p_{storage}")),
+            // Most of what the translation does is done with `L` slots.
+            _ => (format!("slot.load l l_{storage}{number}"), format!("slot.store l l_{storage}{number}")),
         }
     }
 
@@ -300,7 +301,7 @@ impl Generator {
     fn constant(&mut self, ty: ValueType) {
         let small = self.below(7) as i64 - 2;
         let wide = (self.below(1 << 20) as i64).wrapping_mul(0x0123_4567_89AB) - 5;
-        let number = if self.below(4) == 0 { wide } else { small };
+        let number = if self.below(2) == 0 { wide } else { small };
         match ty {
             ValueType::I32 => self.line(&format!("const.i32 {}", number as i32)),
             ValueType::I64 => self.line(&format!("const i64 {number}")),
@@ -310,7 +311,7 @@ impl Generator {
     }
 
     fn expression(&mut self, ty: ValueType, depth: usize) {
-        if depth == 0 || self.below(5) == 0 {
+        if depth == 0 || self.below(4) == 0 {
             if self.below(3) == 0 {
                 return self.constant(ty);
             }
@@ -374,7 +375,8 @@ impl Generator {
             4 => {
                 // An entry that waits on the stack while something else happens.
                 let ty = self.any_type();
-                self.expression(ty, 2);
+                let waiting = self.below(3);
+                self.expression(ty, waiting);
                 self.statement(depth.saturating_sub(1));
                 let (_, store) = self.variable(ty);
                 self.line(&store);
@@ -424,6 +426,7 @@ impl Generator {
             labels: 0,
             in_function: false,
         };
+        let mut end = String::new();
         let g = &mut generator;
         for storage in SCALARS {
             g.line(&format!("type t_{storage} scalar {storage}\ndata d_{storage} t_{storage}"));
@@ -446,6 +449,12 @@ impl Generator {
             g.line(&format!("const.i32 0\nconst.i32 1\nconst.i32 1\nfor.enter for{number} done{number}"));
             g.line(&format!("pass{number}:\nfor.next for{number} pass{number}\ndone{number}:"));
         }
+        // What stands in the `L` slots at the end is seen as well.
+        for storage in SCALARS {
+            let wide = value_type(storage);
+            g.line(&format!("slot.load l l_{storage}0\nslot.store g end_{storage}0\nslot.load l l_{storage}1\nslot.store g end_{storage}1"));
+            end.push_str(&format!("global end_{storage}0 {wide}\nglobal end_{storage}1 {wide}\n"));
+        }
         g.line("return\nend\nfunction helper\nparam p_a i16\nparam p_b i64\nresult i32 i64");
         g.locals();
         g.in_function = true;
@@ -454,7 +463,7 @@ impl Generator {
         g.expression(ValueType::I32, 2);
         g.expression(ValueType::I64, 2);
         g.line("return\nend");
-        generator.text
+        end + &generator.text
     }
 }
 

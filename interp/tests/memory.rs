@@ -21,10 +21,11 @@ fn stores_wrap_and_loads_extend_in_every_place() {
     for (storage, value, expected) in cases {
         let text = format!(
             "outputs 8\nmemory 8\ntype k scalar {storage}\nglobal a i32\nglobal b i32\nglobal c i32\nglobal e i32\nglobal f i32
-            global h i32\nglobal j i32\nglobal v {storage}\ndata dv k\nprogram prog block blk\ntype blk struct k\nslot s {storage}
+            global h i32\nglobal j i32\nglobal k i32\nglobal v {storage}\ndata dv k\nprogram prog block blk\ntype blk struct k\nslot s {storage}
             type fr struct k\nfunction main program prog\nlocal l {storage}\nlocal w i32\nframe fr
             const.i32 {value}\nslot.store l w
             slot.load l w\nslot.store l l\nslot.load l l\nslot.store g a
+            const.i32 0\nslot.store l l\nslot.load l w\nconst.i32 0\ni32.add\nslot.store l l\nslot.load l l\nslot.store g k
             slot.load l w\nslot.store g v\nslot.load g v\nslot.store g b
             slot.load l w\nslot.store p s\nslot.load p s\nslot.store g c
             slot.load l w\nstore d {storage} dv\nload d {storage} dv\nslot.store g e
@@ -35,7 +36,7 @@ fn stores_wrap_and_loads_extend_in_every_place() {
         );
         let mut loaded = load(&text, false);
         loaded.run().unwrap();
-        for index in 0..7 {
+        for index in 0..8 {
             assert_eq!(loaded.slot(index), u64::from(*expected as u32), "{storage} {value} place {index}");
         }
     }
