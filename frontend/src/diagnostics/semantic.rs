@@ -5,4 +5,205 @@ use super::rules;
 rules! {
     /// All rows of this table.
     table;
+
+    UNKNOWN_NAME = "S0001" Error "unknown name" {
+        "No variable, function or enumeration value of this name is visible here. Declare it, or mend the spelling."
+        wrong "PROGRAM p\nVAR\n  speed : INT;\nEND_VAR\n  sped := 1;\nEND_PROGRAM\n"
+        right "PROGRAM p\nVAR\n  speed : INT;\nEND_VAR\n  speed := 1;\nEND_PROGRAM\n"
+    }
+    DUPLICATE_NAME = "S0002" Error "declared twice" {
+        "A name may be declared once in its scope. Case does not matter: `Motor` and `MOTOR` are one name."
+        wrong "PROGRAM p\nVAR\n  a : INT;\n  A : BOOL;\nEND_VAR\n  a := 1;\nEND_PROGRAM\n"
+        right "PROGRAM p\nVAR\n  a : INT;\n  b : BOOL;\nEND_VAR\n  a := 1;\nEND_PROGRAM\n"
+    }
+    UNKNOWN_TYPE = "S0003" Error "unknown type" {
+        "No type of this name is declared, and it is no elementary type or standard function block."
+        wrong "PROGRAM p\nVAR\n  a : INTT;\nEND_VAR\nEND_PROGRAM\n"
+        right "PROGRAM p\nVAR\n  a : INT;\nEND_VAR\nEND_PROGRAM\n"
+    }
+    RECURSIVE_TYPE = "S0004" Error "a type contains itself" {
+        "A structure or function block that holds an instance of itself, directly or through others, would have no end."
+        wrong "TYPE\n  Node : STRUCT\n    next : Node;\n  END_STRUCT;\nEND_TYPE\nPROGRAM p\nEND_PROGRAM\n"
+        right "TYPE\n  Node : STRUCT\n    next : INT;\n  END_STRUCT;\nEND_TYPE\nPROGRAM p\nEND_PROGRAM\n"
+    }
+    RECURSIVE_CALL = "S0005" Error "a function calls itself" {
+        "Calls form no cycle (IEC 61131-3 6.6.1): the memory of a task is known before it runs. Write a loop."
+        wrong "FUNCTION f : INT\nVAR_INPUT\n  n : INT;\nEND_VAR\n  f := f(n - 1);\nEND_FUNCTION\nPROGRAM p\nEND_PROGRAM\n"
+        right "FUNCTION f : INT\nVAR_INPUT\n  n : INT;\nEND_VAR\n  f := n - 1;\nEND_FUNCTION\nPROGRAM p\nEND_PROGRAM\n"
+    }
+    RECURSIVE_CONSTANT = "S0006" Error "a constant depends on itself" {
+        "The value of a CONSTANT is computed from others; following them must come to an end."
+        wrong "VAR_GLOBAL CONSTANT\n  a : INT := b;\n  b : INT := a;\nEND_VAR\nPROGRAM p\nEND_PROGRAM\n"
+        right "VAR_GLOBAL CONSTANT\n  a : INT := b;\n  b : INT := 1;\nEND_VAR\nPROGRAM p\nEND_PROGRAM\n"
+    }
+    NOT_CONSTANT = "S0007" Error "a constant is wanted" {
+        "Initial values, array bounds, string lengths and CASE labels must be known when the program is compiled: literals, CONSTANT variables, and arithmetic on them."
+        wrong "PROGRAM p\nVAR\n  n : INT := 3;\n  a : ARRAY[0..n] OF INT;\nEND_VAR\nEND_PROGRAM\n"
+        right "PROGRAM p\nVAR CONSTANT\n  n : INT := 3;\nEND_VAR\nVAR\n  a : ARRAY[0..n] OF INT;\nEND_VAR\nEND_PROGRAM\n"
+    }
+    UNKNOWN_MEMBER = "S0008" Error "unknown field" {
+        "The structure, function block or enumeration has nothing of this name."
+        wrong "PROGRAM p\nVAR\n  t : TON;\n  b : BOOL;\nEND_VAR\n  b := t.QQ;\nEND_PROGRAM\n"
+        right "PROGRAM p\nVAR\n  t : TON;\n  b : BOOL;\nEND_VAR\n  b := t.Q;\nEND_PROGRAM\n"
+    }
+    HIDDEN_MEMBER = "S0009" Error "the variable is private to its function block" {
+        "From outside only inputs and outputs of a function block are visible."
+        wrong "FUNCTION_BLOCK F\nVAR\n  n : INT;\nEND_VAR\n  n := n + 1;\nEND_FUNCTION_BLOCK\nPROGRAM p\nVAR\n  f : F;\n  a : INT;\nEND_VAR\n  f();\n  a := f.n;\nEND_PROGRAM\n"
+        right "FUNCTION_BLOCK F\nVAR_OUTPUT\n  n : INT;\nEND_VAR\n  n := n + 1;\nEND_FUNCTION_BLOCK\nPROGRAM p\nVAR\n  f : F;\n  a : INT;\nEND_VAR\n  f();\n  a := f.n;\nEND_PROGRAM\n"
+    }
+    NOT_CALLABLE = "S0010" Error "this can not be called" {
+        "Functions and instances of function blocks are called. A type or a program is not; declare an instance. A function block has no value, so its call is a statement."
+        wrong "PROGRAM p\nVAR\n  a : INT;\nEND_VAR\n  TON(IN := TRUE);\nEND_PROGRAM\n"
+        right "PROGRAM p\nVAR\n  t : TON;\nEND_VAR\n  t(IN := TRUE);\nEND_PROGRAM\n"
+    }
+    UNKNOWN_PARAMETER = "S0011" Error "unknown parameter" {
+        "What is called has no parameter of this name, or it is given the wrong way: `:=` for inputs, `=>` for outputs."
+        wrong "PROGRAM p\nVAR\n  t : TON;\nEND_VAR\n  t(INN := TRUE);\nEND_PROGRAM\n"
+        right "PROGRAM p\nVAR\n  t : TON;\nEND_VAR\n  t(IN := TRUE);\nEND_PROGRAM\n"
+    }
+    ARGUMENT_COUNT = "S0012" Error "wrong number of arguments" {
+        "The call has more arguments than there are parameters, or lacks one that has no default."
+        wrong "PROGRAM p\nVAR\n  a : LREAL;\nEND_VAR\n  a := SQRT(a, a);\nEND_PROGRAM\n"
+        right "PROGRAM p\nVAR\n  a : LREAL;\nEND_VAR\n  a := SQRT(a);\nEND_PROGRAM\n"
+    }
+    PARAMETER_TWICE = "S0013" Error "a parameter is given twice" {
+        "Each parameter takes one value."
+        wrong "PROGRAM p\nVAR\n  t : TON;\nEND_VAR\n  t(IN := TRUE, IN := FALSE);\nEND_PROGRAM\n"
+        right "PROGRAM p\nVAR\n  t : TON;\nEND_VAR\n  t(IN := TRUE);\nEND_PROGRAM\n"
+    }
+    IN_OUT = "S0014" Error "VAR_IN_OUT without a variable" {
+        "A VAR_IN_OUT stands for a variable of the caller, so each call connects one. A bit has no address and can not be connected."
+        wrong "FUNCTION f : INT\nVAR_IN_OUT\n  x : INT;\nEND_VAR\n  x := 1;\n  f := x;\nEND_FUNCTION\nPROGRAM p\nVAR\n  a : INT;\nEND_VAR\n  a := f();\nEND_PROGRAM\n"
+        right "FUNCTION f : INT\nVAR_IN_OUT\n  x : INT;\nEND_VAR\n  x := 1;\n  f := x;\nEND_FUNCTION\nPROGRAM p\nVAR\n  a : INT;\n  b : INT;\nEND_VAR\n  a := f(x := b);\nEND_PROGRAM\n"
+    }
+    NOT_A_VARIABLE = "S0015" Error "a variable is wanted" {
+        "Only a variable, or a part of one, can be assigned to or connected."
+        wrong "PROGRAM p\nVAR\n  a : INT;\nEND_VAR\n  a + 1 := 2;\nEND_PROGRAM\n"
+        right "PROGRAM p\nVAR\n  a : INT;\nEND_VAR\n  a := 2;\nEND_PROGRAM\n"
+    }
+    NOT_WRITABLE = "S0016" Error "this can not be written" {
+        "CONSTANT variables, inputs of the process image (%I), system variables, and outputs of a function block from outside are only read."
+        wrong "PROGRAM p\nVAR CONSTANT\n  a : INT := 1;\nEND_VAR\n  a := 2;\nEND_PROGRAM\n"
+        right "PROGRAM p\nVAR\n  a : INT := 1;\nEND_VAR\n  a := 2;\nEND_PROGRAM\n"
+    }
+    OUTSIDE_LOOP = "S0017" Error "EXIT or CONTINUE outside of a loop" {
+        "EXIT leaves the innermost loop and CONTINUE starts its next pass, so both need one around them."
+        wrong "PROGRAM p\n  EXIT;\nEND_PROGRAM\n"
+        right "PROGRAM p\n  WHILE TRUE DO\n    EXIT;\n  END_WHILE;\nEND_PROGRAM\n"
+    }
+    UNREACHABLE = "S0018" Warning "statements that nothing gets to" {
+        "Behind EXIT, CONTINUE or RETURN in the same list nothing runs."
+        wrong "PROGRAM p\nVAR\n  a : INT;\nEND_VAR\n  RETURN;\n  a := 1;\nEND_PROGRAM\n"
+        right "PROGRAM p\nVAR\n  a : INT;\nEND_VAR\n  a := 1;\n  RETURN;\nEND_PROGRAM\n"
+    }
+    EXTERNAL = "S0019" Error "VAR_EXTERNAL without its global" {
+        "A VAR_EXTERNAL names a global variable that the resource sees, with the same type, and CONSTANT if that is."
+        wrong "VAR_GLOBAL\n  g : INT;\nEND_VAR\nPROGRAM p\nVAR_EXTERNAL\n  g : BOOL;\nEND_VAR\n  g := TRUE;\nEND_PROGRAM\n"
+        right "VAR_GLOBAL\n  g : INT;\nEND_VAR\nPROGRAM p\nVAR_EXTERNAL\n  g : INT;\nEND_VAR\n  g := 1;\nEND_PROGRAM\n"
+    }
+    BLOCK_NOT_HERE = "S0020" Error "a function block instance can not stand here" {
+        "An instance keeps its state from call to call. Variables of a FUNCTION and VAR_TEMP are fresh at each call, so they hold none; pass it as VAR_IN_OUT."
+        wrong "FUNCTION f : INT\nVAR\n  t : TON;\nEND_VAR\n  f := 1;\nEND_FUNCTION\nPROGRAM p\nEND_PROGRAM\n"
+        right "FUNCTION f : INT\nVAR_IN_OUT\n  t : TON;\nEND_VAR\n  f := 1;\nEND_FUNCTION\nPROGRAM p\nEND_PROGRAM\n"
+    }
+    NOT_SUPPORTED = "S0021" Error "not of the language yet" {
+        "The standard has this, and this compiler will; it does not yet."
+        wrong "PROGRAM p\nVAR\n  w : WSTRING;\nEND_VAR\nEND_PROGRAM\n"
+        right "PROGRAM p\nVAR\n  w : STRING;\nEND_VAR\nEND_PROGRAM\n"
+    }
+    CASE_OVERLAP = "S0022" Error "a value selects two arms" {
+        "Each value may stand in one arm of a CASE, alone or in a range."
+        wrong "PROGRAM p\nVAR\n  a : INT;\nEND_VAR\n  CASE a OF\n    1..5: a := 0;\n    3: a := 1;\n  END_CASE;\nEND_PROGRAM\n"
+        right "PROGRAM p\nVAR\n  a : INT;\nEND_VAR\n  CASE a OF\n    1..5: a := 0;\n    6: a := 1;\n  END_CASE;\nEND_PROGRAM\n"
+    }
+    BAD_ADDRESS = "S0023" Error "a wrong address" {
+        "The size letter of an address must fit the variable's type: X one bit, B 8, W 16, D 32, L 64. %IX3.5 is bit 5 of byte 3, %IW1 are bytes 2 and 3."
+        wrong "PROGRAM p\nVAR\n  a AT %QB0 : INT;\nEND_VAR\n  a := 1;\nEND_PROGRAM\n"
+        right "PROGRAM p\nVAR\n  a AT %QW0 : INT;\nEND_VAR\n  a := 1;\nEND_PROGRAM\n"
+    }
+    AMBIGUOUS_NAME = "S0024" Error "several enumerations have this value" {
+        "Where the type does not follow from the place, write it before the value."
+        wrong "TYPE\n  A : (on, off);\n  B : (on, dim);\nEND_TYPE\nPROGRAM p\nVAR\n  b : BOOL;\nEND_VAR\n  b := on = on;\nEND_PROGRAM\n"
+        right "TYPE\n  A : (on, off);\n  B : (on, dim);\nEND_TYPE\nPROGRAM p\nVAR\n  b : BOOL;\nEND_VAR\n  b := A#on = A#on;\nEND_PROGRAM\n"
+    }
+    NO_EFFECT = "S0025" Warning "the result is not used" {
+        "A standard function does nothing but compute its result."
+        wrong "PROGRAM p\nVAR\n  a : LREAL;\nEND_VAR\n  SQRT(a);\nEND_PROGRAM\n"
+        right "PROGRAM p\nVAR\n  a : LREAL;\nEND_VAR\n  a := SQRT(a);\nEND_PROGRAM\n"
+    }
+    ZERO_STEP = "S0026" Warning "a step of zero" {
+        "A FOR loop whose step is 0 would never end, so it traps when it starts."
+        wrong "PROGRAM p\nVAR\n  i : INT;\nEND_VAR\n  FOR i := 1 TO 9 BY 0 DO\n    ;\n  END_FOR;\nEND_PROGRAM\n"
+        right "PROGRAM p\nVAR\n  i : INT;\nEND_VAR\n  FOR i := 1 TO 9 BY 1 DO\n    ;\n  END_FOR;\nEND_PROGRAM\n"
+    }
+    DUPLICATE_TASK = "S0030" Error "two tasks of one name" {
+        "Task names are unique in their resource, so that WITH means one of them."
+        wrong "PROGRAM p\nEND_PROGRAM\nCONFIGURATION c\n  RESOURCE r ON cpu\n    TASK t(INTERVAL := T#1ms, PRIORITY := 0);\n    TASK t(INTERVAL := T#2ms, PRIORITY := 1);\n    PROGRAM i WITH t : p;\n  END_RESOURCE\nEND_CONFIGURATION\n"
+        right "PROGRAM p\nEND_PROGRAM\nCONFIGURATION c\n  RESOURCE r ON cpu\n    TASK t(INTERVAL := T#1ms, PRIORITY := 0);\n    TASK u(INTERVAL := T#2ms, PRIORITY := 1);\n    PROGRAM i WITH t : p;\n  END_RESOURCE\nEND_CONFIGURATION\n"
+    }
+    PRIORITY = "S0031" Error "PRIORITY is missing or no priority" {
+        "Each task says its PRIORITY: a whole number from 0, the highest, to 65535."
+        wrong "PROGRAM p\nEND_PROGRAM\nCONFIGURATION c\n  RESOURCE r ON cpu\n    TASK t(INTERVAL := T#1ms);\n    PROGRAM i WITH t : p;\n  END_RESOURCE\nEND_CONFIGURATION\n"
+        right "PROGRAM p\nEND_PROGRAM\nCONFIGURATION c\n  RESOURCE r ON cpu\n    TASK t(INTERVAL := T#1ms, PRIORITY := 0);\n    PROGRAM i WITH t : p;\n  END_RESOURCE\nEND_CONFIGURATION\n"
+    }
+    INTERVAL = "S0032" Error "INTERVAL is no interval" {
+        "INTERVAL is a TIME of at least 1 µs and a whole number of microseconds."
+        wrong "PROGRAM p\nEND_PROGRAM\nCONFIGURATION c\n  RESOURCE r ON cpu\n    TASK t(INTERVAL := 10, PRIORITY := 0);\n    PROGRAM i WITH t : p;\n  END_RESOURCE\nEND_CONFIGURATION\n"
+        right "PROGRAM p\nEND_PROGRAM\nCONFIGURATION c\n  RESOURCE r ON cpu\n    TASK t(INTERVAL := T#10ms, PRIORITY := 0);\n    PROGRAM i WITH t : p;\n  END_RESOURCE\nEND_CONFIGURATION\n"
+    }
+    SINGLE = "S0033" Error "SINGLE is no BOOL source" {
+        "SINGLE starts a task on the rising edge of a BOOL: a global, a variable of a program instance, a bit of the process image, or a literal."
+        wrong "PROGRAM p\nEND_PROGRAM\nCONFIGURATION c\n  RESOURCE r ON cpu\n    TASK t(SINGLE := T#1ms, PRIORITY := 0);\n    PROGRAM i WITH t : p;\n  END_RESOURCE\nEND_CONFIGURATION\n"
+        right "PROGRAM p\nEND_PROGRAM\nCONFIGURATION c\n  RESOURCE r ON cpu\n    VAR_GLOBAL\n      go : BOOL;\n    END_VAR\n    TASK t(SINGLE := go, PRIORITY := 0);\n    PROGRAM i WITH t : p;\n  END_RESOURCE\nEND_CONFIGURATION\n"
+    }
+    UNKNOWN_TASK = "S0034" Error "unknown task" {
+        "WITH names a task of the same resource."
+        wrong "PROGRAM p\nEND_PROGRAM\nCONFIGURATION c\n  RESOURCE r ON cpu\n    TASK fast(INTERVAL := T#1ms, PRIORITY := 0);\n    PROGRAM i WITH fats : p;\n  END_RESOURCE\nEND_CONFIGURATION\n"
+        right "PROGRAM p\nEND_PROGRAM\nCONFIGURATION c\n  RESOURCE r ON cpu\n    TASK fast(INTERVAL := T#1ms, PRIORITY := 0);\n    PROGRAM i WITH fast : p;\n  END_RESOURCE\nEND_CONFIGURATION\n"
+    }
+    UNKNOWN_PROGRAM = "S0035" Error "unknown program" {
+        "A program instance is of a declared PROGRAM."
+        wrong "PROGRAM main\nEND_PROGRAM\nCONFIGURATION c\n  RESOURCE r ON cpu\n    PROGRAM i : mian;\n  END_RESOURCE\nEND_CONFIGURATION\n"
+        right "PROGRAM main\nEND_PROGRAM\nCONFIGURATION c\n  RESOURCE r ON cpu\n    PROGRAM i : main;\n  END_RESOURCE\nEND_CONFIGURATION\n"
+    }
+    CONNECTION = "S0036" Error "a wrong connection" {
+        "A program's inputs are connected with `:=` to a global, an address or a constant, its outputs with `=>` to a global or an address."
+        wrong "PROGRAM p\nVAR\n  a : INT;\nEND_VAR\n  a := 1;\nEND_PROGRAM\nCONFIGURATION c\n  RESOURCE r ON cpu\n    PROGRAM i : p(a := 1);\n  END_RESOURCE\nEND_CONFIGURATION\n"
+        right "PROGRAM p\nVAR_INPUT\n  a : INT;\nEND_VAR\n  ;\nEND_PROGRAM\nCONFIGURATION c\n  RESOURCE r ON cpu\n    PROGRAM i : p(a := 1);\n  END_RESOURCE\nEND_CONFIGURATION\n"
+    }
+    NOTHING_RUNS = "S0037" Warning "nothing runs" {
+        "A resource without a program instance has tasks with nothing to do."
+        wrong "PROGRAM p\nEND_PROGRAM\nCONFIGURATION c\n  RESOURCE r ON cpu\n    TASK t(INTERVAL := T#1ms, PRIORITY := 0);\n  END_RESOURCE\nEND_CONFIGURATION\n"
+        right "PROGRAM p\nEND_PROGRAM\nCONFIGURATION c\n  RESOURCE r ON cpu\n    TASK t(INTERVAL := T#1ms, PRIORITY := 0);\n    PROGRAM i WITH t : p;\n  END_RESOURCE\nEND_CONFIGURATION\n"
+    }
+    SHARED_GLOBAL = "S0038" Error "two resources use one global" {
+        "Resources run on their own and share no memory, so a global of the configuration may be used by one of them. Declare it in the resource."
+        wrong "PROGRAM p\n  g := g + 1;\nEND_PROGRAM\nCONFIGURATION c\n  VAR_GLOBAL\n    g : INT;\n  END_VAR\n  RESOURCE a ON cpu\n    PROGRAM i : p;\n  END_RESOURCE\n  RESOURCE b ON cpu\n    PROGRAM i : p;\n  END_RESOURCE\nEND_CONFIGURATION\n"
+        right "PROGRAM p\n  g := g + 1;\nEND_PROGRAM\nCONFIGURATION c\n  RESOURCE a ON cpu\n    VAR_GLOBAL\n      g : INT;\n    END_VAR\n    PROGRAM i : p;\n  END_RESOURCE\n  RESOURCE b ON cpu\n    VAR_GLOBAL\n      g : INT;\n    END_VAR\n    PROGRAM i : p;\n  END_RESOURCE\nEND_CONFIGURATION\n"
+    }
+    STARTUP = "S0039" Error "no startup function" {
+        "The attribute 'startup' stands before one FUNCTION without parameters."
+        wrong "{attribute 'startup'}\nFUNCTION f : INT\nVAR_INPUT\n  n : INT;\nEND_VAR\n  f := n;\nEND_FUNCTION\nPROGRAM p\nEND_PROGRAM\n"
+        right "{attribute 'startup'}\nFUNCTION f : INT\n  f := 1;\nEND_FUNCTION\nPROGRAM p\nEND_PROGRAM\n"
+    }
+    ATTRIBUTE = "S0040" Error "a wrong attribute value" {
+        "Attributes of a task: 'watchdog' and 'phase' are times as in 'T#10ms', 'watchdog_sensitivity' a number, 'overrun' is 'grid', 'at-once' or 'realign'."
+        wrong "PROGRAM p\nEND_PROGRAM\nCONFIGURATION c\n  RESOURCE r ON cpu\n    {attribute 'watchdog' := 'soon'}\n    TASK t(INTERVAL := T#1ms, PRIORITY := 0);\n    PROGRAM i WITH t : p;\n  END_RESOURCE\nEND_CONFIGURATION\n"
+        right "PROGRAM p\nEND_PROGRAM\nCONFIGURATION c\n  RESOURCE r ON cpu\n    {attribute 'watchdog' := 'T#5ms'}\n    TASK t(INTERVAL := T#1ms, PRIORITY := 0);\n    PROGRAM i WITH t : p;\n  END_RESOURCE\nEND_CONFIGURATION\n"
+    }
+    FREEWHEELING = "S0041" Warning "a task without INTERVAL and SINGLE" {
+        "Such a task runs in every round, as fast as the resource can."
+        wrong "PROGRAM p\nEND_PROGRAM\nCONFIGURATION c\n  RESOURCE r ON cpu\n    TASK t(PRIORITY := 0);\n    PROGRAM i WITH t : p;\n  END_RESOURCE\nEND_CONFIGURATION\n"
+        right "PROGRAM p\nEND_PROGRAM\nCONFIGURATION c\n  RESOURCE r ON cpu\n    TASK t(INTERVAL := T#1ms, PRIORITY := 0);\n    PROGRAM i WITH t : p;\n  END_RESOURCE\nEND_CONFIGURATION\n"
+    }
+    LIMIT = "S0050" Error "a limit of the container" {
+        "The compiled form has room for 65535 of each kind of thing, and a memory image has a largest size. Split the project into resources."
+        wrong ""
+        right ""
+    }
+    TOO_DEEP = "S0051" Error "nested too deep" {
+        "Types and declarations that depend on one another nest up to a fixed depth."
+        wrong ""
+        right ""
+    }
 }

@@ -1,0 +1,238 @@
+//! From the syntax tree to the typed tree ([`tree`]): what the names mean, which types there are, whether the program is sound.
+//!
+//! Three steps, in this order. *Declarations* ([`declare`], [`spec`], [`init`]): every type, constant, variable and unit gets its
+//! definition, on demand and with cycles detected, because a constant may stand in a type and an enumeration in a constant.
+//! *Configuration* ([`config`]): resources, tasks, program instances. *Bodies* ([`stmt`], [`expr`], [`call`], [`convert`]): for each
+//! resource the units that it reaches, with the globals that it sees; then the rest, so that nothing stays unchecked.
+//!
+//! A mistake is reported once: what is wrong has the type [`types::Ty::Error`], which fits everywhere.
+
+pub mod tree;
+pub mod types;
+
+mod call;
+mod config;
+mod convert;
+mod declare;
+mod expr;
+mod fold;
+mod init;
+mod place;
+mod reach;
+mod spec;
+mod standard;
+mod stmt;
+mod tasks;
+
+use std::collections::HashMap;
+use std::rc::Rc;
+
+use self::tree::{GlobalId, GlobalInfo, PouId, PouInfo, Project};
+use self::types::{Ty, TyId, TypeTable, Value};
+use crate::Dialect;
+use crate::diagnostics::{Diagnostic, Rule, Severity, semantic as rules};
+use crate::source::{FileId, SourceMap, Span};
+use crate::syntax::ast::{Ast, Ident, Pou, TypeDecl, VarDecl, VarSection};
+use crate::syntax::symbol::Symbol;
+
+/// How deep declarations may depend on one another (a constant on a constant, a type on a type).
+const MAX_DEPENDENCE: u32 = 200;
+
+/// Checks a parsed program. `standard` is the file of the standard function blocks. The project is complete only when no
+/// diagnostic is an error.
+pub fn analyze(
+    ast: &Ast,
+    sources: &SourceMap,
+    dialect: Dialect,
+    standard: Option<FileId>,
+) -> (Project, Vec<Diagnostic>) {
+    let mut analyzer = Analyzer::new(ast, sources, dialect, standard);
+    analyzer.declare();
+    let resources = analyzer.configure();
+    let resources = analyzer.check_bodies(resources);
+    let pous = analyzer.pous.into_iter().flatten().collect();
+    (Project { types: analyzer.types, pous, globals: analyzer.globals, resources }, analyzer.diagnostics)
+}
+
+/// How far a definition is.
+#[derive(Debug, Clone)]
+enum State<T> {
+    Waiting,
+    Busy,
+    Done(T),
+}
+
+/// What a type name stands for.
+#[derive(Debug, Clone, Copy)]
+enum TypeSource<'a> {
+    Declared(&'a TypeDecl),
+    Block(PouId),
+}
+
+#[derive(Debug)]
+struct TypeEntry<'a> {
+    source: TypeSource<'a>,
+    state: State<(Ty, Value)>,
+    span: Span,
+}
+
+/// A CONSTANT that declarations may use.
+#[derive(Debug)]
+struct ConstEntry<'a> {
+    decl: &'a VarDecl,
+    state: State<Option<(Ty, Value)>>,
+}
+
+/// State of the whole analysis.
+struct Analyzer<'a> {
+    ast: &'a Ast,
+    sources: &'a SourceMap,
+    dialect: Dialect,
+    standard: Option<FileId>,
+    diagnostics: Vec<Diagnostic>,
+    types: TypeTable,
+    type_names: HashMap<Symbol, TypeEntry<'a>>,
+    /// Enumeration values of declared types: the types that have one of this name.
+    enum_owners: HashMap<Symbol, Vec<Symbol>>,
+    /// Enumeration values of types without a name.
+    nameless_enums: HashMap<Symbol, Vec<TyId>>,
+    pou_decls: Vec<&'a Pou>,
+    pou_names: HashMap<Symbol, PouId>,
+    pous: Vec<Option<Rc<PouInfo>>>,
+    /// Names of each unit's variables.
+    scopes: Vec<HashMap<Symbol, tree::VarId>>,
+    constants: HashMap<(Option<PouId>, Symbol), ConstEntry<'a>>,
+    globals: Vec<GlobalInfo>,
+    global_names: HashMap<Symbol, Vec<GlobalId>>,
+    global_decls: Vec<GlobalDecl<'a>>,
+    depth: u32,
+}
+
+/// A global as declared.
+#[derive(Debug, Clone, Copy)]
+struct GlobalDecl<'a> {
+    section: &'a VarSection,
+    decl: &'a VarDecl,
+    name: Ident,
+    configuration: Option<u32>,
+    resource: Option<u32>,
+}
+
+impl<'a> Analyzer<'a> {
+    fn new(ast: &'a Ast, sources: &'a SourceMap, dialect: Dialect, standard: Option<FileId>) -> Self {
+        Analyzer {
+            ast,
+            sources,
+            dialect,
+            standard,
+            diagnostics: Vec::new(),
+            types: <TypeTable as Default>::default(),
+            type_names: HashMap::new(),
+            enum_owners: HashMap::new(),
+            nameless_enums: HashMap::new(),
+            pou_decls: Vec::new(),
+            pou_names: HashMap::new(),
+            pous: Vec::new(),
+            scopes: Vec::new(),
+            constants: HashMap::new(),
+            globals: Vec::new(),
+            global_names: HashMap::new(),
+            global_decls: Vec::new(),
+            depth: 0,
+        }
+    }
+
+    fn text(&self, symbol: Symbol) -> &'a str {
+        self.ast.names.text(symbol)
+    }
+
+    fn spelling(&self, ident: &Ident) -> &'a str {
+        self.ast.names.text(ident.spelling)
+    }
+
+    fn report(&mut self, rule: &'static Rule, span: Span, message: impl Into<String>) {
+        self.push(Diagnostic::new(rule, span, message));
+    }
+
+    /// Reports something that the standard refuses and vendors accept: a warning, under `--dialect iec` an error.
+    fn report_vendor(&mut self, rule: &'static Rule, span: Span, message: impl Into<String>) {
+        let mut found = Diagnostic::new(rule, span, message);
+        if self.dialect == Dialect::Iec {
+            found.severity = Severity::Error;
+        }
+        self.push(found);
+    }
+
+    fn push(&mut self, found: Diagnostic) {
+        // The standard library's own text is ours: nothing in it is the user's to mend.
+        if found.severity != Severity::Error && Some(found.span.file) == self.standard {
+            return;
+        }
+        self.diagnostics.push(found);
+    }
+
+    fn info(&self, pou: PouId) -> Option<Rc<PouInfo>> {
+        self.pous.get(pou.0 as usize).cloned().flatten()
+    }
+
+    /// Runs a step that may lead to itself through declarations; refuses when that goes too deep.
+    fn nested<T>(&mut self, span: Span, step: impl FnOnce(&mut Self) -> T) -> Option<T> {
+        if self.depth >= MAX_DEPENDENCE {
+            let message = format!("declarations depend on one another more than {MAX_DEPENDENCE} levels deep");
+            self.report(&rules::TOO_DEEP, span, message);
+            return None;
+        }
+        self.depth += 1;
+        let result = step(self);
+        self.depth -= 1;
+        Some(result)
+    }
+
+    /// Reports an unknown name with the nearest known one.
+    fn report_unknown(
+        &mut self,
+        rule: &'static Rule,
+        ident: &Ident,
+        message: String,
+        known: impl Iterator<Item = Symbol>,
+    ) {
+        if ident.is_missing() {
+            return;
+        }
+        let wanted = self.text(ident.symbol);
+        let mut best: Option<(usize, &str)> = None;
+        for symbol in known {
+            let name = self.text(symbol);
+            let limit = (wanted.len() / 3).clamp(1, 3);
+            if let Some(distance) = edit_distance(wanted, name, limit) {
+                if best.is_none_or(|found| (distance, name) < found) {
+                    best = Some((distance, name));
+                }
+            }
+        }
+        let mut found = Diagnostic::new(rule, ident.span, message);
+        if let Some((_, name)) = best {
+            found = found.help(format!("did you mean `{name}`?"));
+        }
+        self.push(found);
+    }
+}
+
+/// Letters to change to get from one name to the other, when at most `limit`.
+fn edit_distance(a: &str, b: &str, limit: usize) -> Option<usize> {
+    let (a, b) = (a.as_bytes(), b.as_bytes());
+    if a.len().abs_diff(b.len()) > limit || a.len() > 64 {
+        return None;
+    }
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, x) in a.iter().enumerate() {
+        let mut diagonal = row[0];
+        row[0] = i + 1;
+        for (j, y) in b.iter().enumerate() {
+            let change = diagonal + usize::from(x != y);
+            diagonal = row[j + 1];
+            row[j + 1] = change.min(diagonal + 1).min(row[j] + 1);
+        }
+    }
+    row.last().copied().filter(|distance| *distance <= limit)
+}

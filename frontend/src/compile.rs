@@ -1,0 +1,138 @@
+//! The whole way: bytes of source files to containers.
+
+use khz_bytecode::container::Container;
+use khz_machine::library::blocks;
+use std::collections::BTreeSet;
+
+use crate::analysis;
+use crate::diagnostics::{Diagnostic, has_errors, tidy};
+use crate::lower;
+use crate::source::{FileId, SourceMap};
+use crate::syntax::parser::parse;
+
+/// Name of the file that holds the standard function blocks a program uses.
+pub const STANDARD_FILE: &str = "<standard>";
+
+/// Stack of the compiling thread. The tree's depth is limited (`syntax::parser`), and this is room for it in every build.
+const STACK_BYTES: usize = 256 << 20;
+
+/// Which implicit conversions are taken without a word.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Dialect {
+    /// What vendors take, with a warning for each.
+    #[default]
+    Default,
+    /// Only what the standard's figure of implicit conversions has.
+    Iec,
+}
+
+/// How to compile.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct CompileOptions {
+    /// Which implicit conversions are taken.
+    pub dialect: Dialect,
+    /// Leave the debug section out.
+    pub strip: bool,
+}
+
+/// A source file: a name for messages and its bytes as they are on disk.
+#[derive(Debug, Clone)]
+pub struct SourceInput {
+    /// The name that messages and the debug section show.
+    pub name: String,
+    /// Its bytes.
+    pub bytes: Vec<u8>,
+}
+
+/// One compiled RESOURCE.
+#[derive(Debug, Clone)]
+pub struct CompiledResource {
+    /// Its name.
+    pub name: String,
+    /// What it is compiled to; not verified yet.
+    pub container: Container,
+}
+
+/// What came of it.
+#[derive(Debug)]
+pub struct Compilation {
+    /// One for each RESOURCE; empty when a diagnostic is an error.
+    pub resources: Vec<CompiledResource>,
+    /// Everything there is to say, in order of place.
+    pub diagnostics: Vec<Diagnostic>,
+    /// The sources, for places in messages.
+    pub sources: SourceMap,
+}
+
+/// Compiles sources, in their order, to one container for each RESOURCE.
+pub fn compile(sources: &[SourceInput], options: &CompileOptions) -> Compilation {
+    on_large_stack(sources, options, true)
+}
+
+/// Finds everything there is to say about sources without making containers.
+pub fn check(sources: &[SourceInput], options: &CompileOptions) -> Compilation {
+    on_large_stack(sources, options, false)
+}
+
+fn on_large_stack(sources: &[SourceInput], options: &CompileOptions, lowers: bool) -> Compilation {
+    std::thread::scope(|scope| {
+        let builder = std::thread::Builder::new().name("khz-frontend".to_owned()).stack_size(STACK_BYTES);
+        match builder.spawn_scoped(scope, || run(sources, options, lowers)) {
+            Ok(thread) => thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)),
+            // No thread to be had: the caller's own stack does for programs of ordinary depth.
+            Err(_) => run(sources, options, lowers),
+        }
+    })
+}
+
+fn run(inputs: &[SourceInput], options: &CompileOptions, lowers: bool) -> Compilation {
+    let mut sources = SourceMap::new();
+    let mut diagnostics = Vec::new();
+    for input in inputs {
+        let (_, found) = sources.add_bytes(input.name.clone(), &input.bytes);
+        diagnostics.extend(found);
+    }
+    let standard = add_standard_blocks(&mut sources);
+    let (ast, found) = parse(&sources);
+    diagnostics.extend(found);
+    let (project, found) = analysis::analyze(&ast, &sources, options.dialect, standard);
+    diagnostics.extend(found);
+    let mut resources = Vec::new();
+    if lowers && !has_errors(&diagnostics) {
+        let hashes = lower::Hashes::of(inputs, &sources);
+        for plan in &project.resources {
+            match lower::lower(&project, plan, &ast.names, &sources, &hashes, options.strip) {
+                Ok(container) => resources.push(CompiledResource { name: plan.name.clone(), container }),
+                Err(found) => diagnostics.push(*found),
+            }
+        }
+        if has_errors(&diagnostics) {
+            resources.clear();
+        }
+    }
+    Compilation { resources, diagnostics: tidy(diagnostics), sources }
+}
+
+/// Adds a file with the standard function blocks whose names occur in the sources.
+fn add_standard_blocks(sources: &mut SourceMap) -> Option<FileId> {
+    let known: Vec<blocks::StandardBlock> = blocks::all().collect();
+    let names: BTreeSet<&str> = known.iter().map(|block| block.name.as_str()).collect();
+    let longest = names.iter().map(|name| name.len()).max().unwrap_or(0);
+    let mut used: BTreeSet<String> = BTreeSet::new();
+    for (_, file) in sources.files() {
+        for word in file.text().split(|c: char| !c.is_ascii_alphanumeric() && c != '_') {
+            if word.len() < 2 || word.len() > longest {
+                continue;
+            }
+            let word = word.to_ascii_uppercase();
+            if names.contains(word.as_str()) {
+                used.insert(word);
+            }
+        }
+    }
+    if used.is_empty() {
+        return None;
+    }
+    let text: String = known.iter().filter(|block| used.contains(&block.name)).map(|block| block.source.as_str()).collect();
+    Some(sources.add_text(STANDARD_FILE, text))
+}
