@@ -11,13 +11,14 @@
 //! - The lowering decides nothing, so that every improvement is a pass on one small form, with tests that show it before and after.
 //! - Code is owned by an `Arc` that each handle holds and is freed when the last one goes. It is never written after it was finished.
 //!
-//! `unsafe` stands in two files: `code.rs` (memory of code, calling into it) and `runtime.rs` (what code calls).
+//! `unsafe` stands in three files: `code.rs` (memory of code, calling into it), `run.rs` (one call of it) and `runtime.rs` (what code calls).
 
 pub mod build;
 pub mod context;
 pub mod lower;
 pub mod mir;
 pub mod passes;
+pub mod text;
 
 
 mod code;
@@ -34,6 +35,7 @@ use khz_machine::image::ImageLayout;
 pub use code::Handle;
 pub use passes::Passes;
 pub use run::Jit;
+pub use text::{asm_text, clif_text, mir_text};
 
 
 /// What code is made like.

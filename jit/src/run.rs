@@ -28,6 +28,7 @@ pub(crate) fn settings_for(isa: &OwnedTargetIsa, plan: &Plan, options: JitOption
         fuel: options.fuel,
         depth: plan.calls_virtual,
         native_nan: matches!(isa.triple().architecture, target_lexicon::Architecture::X86_64),
+        source_lines: false,
     }
 }
 

@@ -1,1 +1,151 @@
-//! What `khz disasm` prints: the mid-level form, CLIF and machine code, each beside the source lines it comes from.
+//! What `khz disasm` prints: the mid-level form, CLIF and machine code of a function, each with the source lines it comes from.
+
+use std::fmt::Write;
+
+use cranelift_codegen::ir::SourceLoc;
+use cranelift_frontend::FunctionBuilderContext;
+use khz_bytecode::container::{DebugSection, LineEntry};
+use khz_bytecode::ids::FunctionId;
+use khz_bytecode::verify::Verified;
+use khz_machine::image::ImageLayout;
+
+use crate::build::{ProgramMemory, build};
+use crate::code::{Key, host_isa};
+use crate::lower::{Settings, lower};
+use crate::plan::{self, Plan};
+use crate::run::{assembly, settings_for};
+use crate::{JitError, JitOptions, mir, passes};
+
+/// The source line of a bytecode offset, as `file:line`.
+fn source_line(debug: Option<&DebugSection>, function: FunctionId, offset: u32) -> Option<String> {
+    let debug = debug?;
+    let behind = debug.lines.partition_point(|line| (line.function, line.offset) <= (function, offset));
+    let entry: &LineEntry = debug.lines.get(behind.checked_sub(1)?)?;
+    let file = debug.files.get(usize::from(entry.file)).filter(|_| entry.function == function)?;
+    Some(format!("{}:{}", file.name, entry.line))
+}
+
+/// A function as it is compiled: for the first program instance that reaches it.
+fn key_of(plan: &Plan, function: FunctionId) -> Key {
+    let mut keys = plan.functions.keys();
+    keys.find(|key| key.0 == function).copied().unwrap_or((function, ProgramMemory::None))
+}
+
+/// A function in the mid-level form, after the passes.
+///
+/// A function that no entry reaches is shown as if it had no program's memory; such a function of a program has none to show and gives nothing.
+#[must_use]
+pub fn mir_text(verified: &Verified, layout: &ImageLayout, options: JitOptions, function: FunctionId) -> String {
+    let scope = plan::scope(verified, layout);
+    let Some(form) = form_of(&scope, &Plan::new(&scope), options, function) else { return String::new() };
+    let debug = verified.container().debug.as_ref();
+    form.1.text(&|place| {
+        let data = form.1.places[place.index()];
+        source_line(debug, data.function, data.offset)
+    })
+}
+
+fn form_of(
+    scope: &crate::build::Scope<'_>,
+    plan: &Plan,
+    options: JitOptions,
+    function: FunctionId,
+) -> Option<(Key, mir::Function)> {
+    let key = key_of(plan, function);
+    let owner = scope.verified.container().functions.get(function.index())?.owner;
+    if matches!(owner, khz_bytecode::container::Owner::Program(_)) && key.1 == ProgramMemory::None {
+        return None;
+    }
+    let mut form = build(scope, key.0, key.1);
+    passes::run(&mut form, scope.verified, options.passes);
+    Some((key, form))
+}
+
+/// A function as CLIF, as it is handed to Cranelift.
+///
+/// # Errors
+/// A host without native code.
+pub fn clif_text(
+    verified: &Verified,
+    layout: &ImageLayout,
+    options: JitOptions,
+    function: FunctionId,
+) -> Result<String, JitError> {
+    let compiled = Compiled::new(verified, layout, options, function, false)?;
+    Ok(compiled.map(|compiled| compiled.clif).unwrap_or_default())
+}
+
+/// A function as machine code: Cranelift's listing, then which bytes come from which source line.
+///
+/// # Errors
+/// A host without native code, or a function that Cranelift refuses.
+pub fn asm_text(
+    verified: &Verified,
+    layout: &ImageLayout,
+    options: JitOptions,
+    function: FunctionId,
+) -> Result<String, JitError> {
+    let compiled = Compiled::new(verified, layout, options, function, true)?;
+    Ok(compiled.map(|compiled| compiled.assembly).unwrap_or_default())
+}
+
+struct Compiled {
+    clif: String,
+    assembly: String,
+}
+
+impl Compiled {
+    fn new(
+        verified: &Verified,
+        layout: &ImageLayout,
+        options: JitOptions,
+        function: FunctionId,
+        compile: bool,
+    ) -> Result<Option<Compiled>, JitError> {
+        let scope = plan::scope(verified, layout);
+        let plan = Plan::new(&scope);
+        let isa = host_isa(options.verify_ir)?;
+        let settings = Settings { source_lines: true, ..settings_for(&isa, &plan, options) };
+        let mut module = assembly(&scope, &plan, isa.clone())?;
+        let mut compilation = module.compilation();
+        let Some((key, form)) = form_of(&scope, &plan, options, function) else { return Ok(None) };
+        let mut builder_context = FunctionBuilderContext::new();
+        lower(&scope, &form, key.1, settings, &mut module, &mut compilation.func, &mut builder_context);
+        let debug = verified.container().debug.as_ref();
+        let line = |location: SourceLoc| {
+            let offset = Some(location).filter(|location| !location.is_default())?.bits();
+            source_line(debug, function, offset)
+        };
+        let clif = with_lines(&compilation.func.display().to_string(), &line);
+        let mut assembly = String::new();
+        if compile {
+            compilation.set_disasm(true);
+            let done = compilation.compile(&*isa, &mut cranelift_codegen::control::ControlPlane::default());
+            let code = done.map_err(|error| JitError::Function { function, reason: format!("{:?}", error.inner) })?;
+            assembly.push_str(code.vcode.as_deref().unwrap_or_default());
+            let _ = writeln!(assembly, "; {} bytes", code.code_buffer().len());
+            for range in code.buffer.get_srclocs_sorted() {
+                if let Some(line) = line(range.loc) {
+                    let _ = writeln!(assembly, "; {:#06x}..{:#06x} {line}", range.start, range.end);
+                }
+            }
+        }
+        Ok(Some(Compiled { clif, assembly }))
+    }
+}
+
+/// CLIF marks lines with `@` and the bytecode offset in hexadecimal; each change of the source line gets a line of its own.
+fn with_lines(clif: &str, line: &dyn Fn(SourceLoc) -> Option<String>) -> String {
+    let mut out = String::new();
+    let mut last = None;
+    for text in clif.lines() {
+        let mark = text.trim_start().strip_prefix('@').and_then(|rest| rest.split_whitespace().next());
+        let source = mark.and_then(|mark| u32::from_str_radix(mark, 16).ok()).and_then(|at| line(SourceLoc::new(at)));
+        if source.is_some() && source != last {
+            let _ = writeln!(out, "; {}", source.as_deref().unwrap_or_default());
+            last = source;
+        }
+        let _ = writeln!(out, "{text}");
+    }
+    out
+}

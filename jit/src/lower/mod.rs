@@ -46,6 +46,8 @@ pub struct Settings {
     pub depth: bool,
     /// Whether arithmetic itself gives the one NaN (x86-64); elsewhere results are made canonical.
     pub native_nan: bool,
+    /// Whether instructions carry their bytecode offset, for listings.
+    pub source_lines: bool,
 }
 
 /// CLIF type of a mid-level type.
@@ -165,7 +167,8 @@ impl Lowerer<'_, '_> {
         let flags = self.host_flags().with_readonly().with_can_move();
         self.deadline = self.builder.ins().load(types::I64, flags, self.context, context::DEADLINE);
         self.add_parameters();
-        for number in 0..self.function.blocks.len() {
+        let reachable = self.function.reachable();
+        for number in (0..self.function.blocks.len()).filter(|number| reachable[*number]) {
             let data = &self.function.blocks[number];
             if number > 0 {
                 self.builder.switch_to_block(self.blocks[number]);
@@ -173,6 +176,10 @@ impl Lowerer<'_, '_> {
             self.write_back = data.write_back;
             for instruction in &data.instructions {
                 self.place = instruction.place;
+                if self.settings.source_lines {
+                    let offset = self.function.places[self.place.index()].offset;
+                    self.builder.set_srcloc(ir::SourceLoc::new(offset));
+                }
                 self.instruction(instruction);
             }
             self.terminator(&data.terminator);

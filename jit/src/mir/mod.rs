@@ -521,6 +521,19 @@ impl Function {
         Block(self.blocks.len() as u32 - 1)
     }
 
+    /// Which blocks the entry leads to.
+    #[must_use]
+    pub fn reachable(&self) -> Vec<bool> {
+        let mut reached = vec![false; self.blocks.len()];
+        let mut open = vec![Block(0)];
+        while let Some(block) = open.pop() {
+            if !std::mem::replace(&mut reached[block.index()], true) {
+                open.extend(self.blocks[block.index()].terminator.targets().iter().map(|target| target.block));
+            }
+        }
+        reached
+    }
+
     /// Whether `inner` is `outer` or lies in it.
     #[must_use]
     pub fn loop_contains(&self, outer: LoopId, inner: Option<LoopId>) -> bool {

@@ -3,7 +3,7 @@
 use std::fmt::{self, Display, Formatter, Write};
 
 use super::{
-    Access, Address, Base, BlockData, Const, Control, ForTest, Function, Instruction, Op, Operands, Slot, Target,
+    Access, Address, Base, BlockData, Const, Control, ForTest, Function, Instruction, Op, Operands, Place, Slot, Target,
     Terminator, Type, Value,
 };
 
@@ -209,8 +209,33 @@ impl Function {
     }
 }
 
+/// A function as text, with what `lines` says of each place: a line of its own where it changes.
+struct Listing<'a> {
+    function: &'a Function,
+    lines: &'a dyn Fn(Place) -> Option<String>,
+}
+
+impl Display for Listing<'_> {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        self.function.write(f, self.lines)
+    }
+}
+
 impl Display for Function {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        self.write(f, &|_| None)
+    }
+}
+
+impl Function {
+    /// As text with source lines: `lines` gives the line of a place.
+    #[must_use]
+    pub fn text(&self, lines: &dyn Fn(Place) -> Option<String>) -> String {
+        Listing { function: self, lines }.to_string()
+    }
+
+    fn write(&self, f: &mut Formatter<'_>, lines: &dyn Fn(Place) -> Option<String>) -> fmt::Result {
+        let mut last = None;
         writeln!(f, "function f{}", self.id)?;
         self.write_loops(f)?;
         for (number, dirty) in self.write_backs.iter().enumerate().skip(1) {
@@ -223,6 +248,11 @@ impl Display for Function {
         for (number, block) in self.blocks.iter().enumerate() {
             self.write_block_head(f, number, block)?;
             for instruction in &block.instructions {
+                let line = lines(instruction.place);
+                if line.is_some() && line != last {
+                    writeln!(f, "  ; {}", line.as_deref().unwrap_or_default())?;
+                    last = line;
+                }
                 self.write_instruction(f, instruction)?;
             }
             writeln!(f, "  {}", block.terminator)?;

@@ -1,23 +1,82 @@
 //! Improvements of the mid-level form: one file each, each a function of a [`Function`](crate::mir::Function) and what it calls.
 //!
-//! The order is that of [`run`]. Each may be switched off, for measuring and for finding a fault.
+//! [`run`] gives the order, [`Passes`] switches them one by one, for measuring and for finding a fault. Each is linear in the size of the function.
+
+pub mod checks;
+pub mod fold;
+pub mod for_loops;
+pub mod if_convert;
+pub mod promote;
+pub mod ranges;
 
 use khz_bytecode::verify::Verified;
 
 use crate::mir::Function;
 
-/// Which passes run.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Passes {
+macro_rules! passes {
+    ($($(#[$doc:meta])* $name:ident;)*) => {
+        /// Which passes run.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+        pub struct Passes { $($(#[$doc])* pub $name: bool,)* }
+
+        impl Passes {
+            /// All of them.
+            pub const ALL: Passes = Passes { $($name: true),* };
+            /// None: each instruction as it stands in the bytecode.
+            pub const NONE: Passes = Passes { $($name: false),* };
+            /// Their names, in the order in which they first run.
+            pub const NAMES: &'static [&'static str] = &[$(stringify!($name)),*];
+
+            /// The passes with one more, by its name.
+            #[must_use]
+            pub fn with(mut self, name: &str) -> Option<Passes> {
+                match name {
+                    $(stringify!($name) => self.$name = true,)*
+                    _ => return None,
+                }
+                Some(self)
+            }
+        }
+    };
+}
+
+passes! {
+    /// [`promote`]: slots in variables while a loop runs.
+    promote;
+    /// [`fold`]: constants, wraps that change nothing, decided branches.
+    fold;
+    /// [`for_loops`]: FOR loops as plain arithmetic.
+    for_loops;
+    /// [`checks`]: guards that can not fire.
+    checks;
+    /// [`if_convert`]: short integer IFs as selects.
+    if_convert;
 }
 
 impl Default for Passes {
     fn default() -> Self {
-        Passes {}
+        Passes::ALL
     }
 }
 
 /// Runs the passes on a function.
 pub fn run(function: &mut Function, verified: &Verified, passes: Passes) {
-    let _ = (function, verified, passes);
+    if passes.promote {
+        promote::run(function, promote::CallEffects::new(verified));
+    }
+    if passes.fold {
+        fold::run(function);
+    }
+    if passes.checks {
+        checks::run(function);
+    }
+    if passes.for_loops {
+        for_loops::run(function);
+    }
+    if passes.fold {
+        fold::run(function);
+    }
+    if passes.if_convert {
+        if_convert::run(function);
+    }
 }
