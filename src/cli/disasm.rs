@@ -2,6 +2,7 @@
 
 use khz_bytecode::disassembler;
 use khz_bytecode::ids::FunctionId;
+use khz_jit::{JitOptions, asm_text, clif_text, mir_text};
 use kilohertz::pipeline::Program;
 use serde_json::json;
 
@@ -23,16 +24,24 @@ pub fn run(args: &DisasmArgs) -> Outcome {
 
 fn text(args: &DisasmArgs, program: &Program) -> Result<String, Failure> {
     let layout = program.layout(khz_bytecode::limits::MAX_IMAGE_BYTES).map_err(Failure::refused)?;
-    let listing = |form| khz_jit::listing(&program.verified, &layout, form).map_err(Failure::refused);
-    if args.mir {
-        return listing(khz_jit::Form::Mir);
+    let mut out = String::new();
+    for id in (0..program.container().functions.len()).filter_map(FunctionId::from_index) {
+        let options = JitOptions::default();
+        let listing = if args.mir {
+            mir_text(&program.verified, &layout, options, id)
+        } else if args.clif {
+            clif_text(&program.verified, &layout, options, id).map_err(Failure::refused)?
+        } else if args.asm {
+            asm_text(&program.verified, &layout, options, id).map_err(Failure::refused)?
+        } else {
+            disassembler::disassemble_function(program.container(), id).unwrap_or_default()
+        };
+        let name = program.container().debug.as_ref().and_then(|debug| debug.function_names.get(id.index()));
+        if let Some(name) = name.filter(|name| !name.is_empty()) {
+            out += &format!("; {name}\n");
+        }
+        out += listing.trim_end();
+        out += "\n\n";
     }
-    if args.clif {
-        return listing(khz_jit::Form::Clif);
-    }
-    if args.asm {
-        return listing(khz_jit::Form::Asm);
-    }
-    let ids = (0..program.container().functions.len()).filter_map(FunctionId::from_index);
-    Ok(ids.filter_map(|id| disassembler::disassemble_function(program.container(), id)).collect::<Vec<_>>().join("\n"))
+    Ok(out)
 }
