@@ -39,6 +39,7 @@
 mod analysis;
 pub mod compile;
 pub mod diagnostics;
+pub mod format;
 mod lower;
 pub mod source;
 pub mod syntax;

@@ -236,3 +236,6 @@ fn edit_distance(a: &str, b: &str, limit: usize) -> Option<usize> {
     }
     row.last().copied().filter(|distance| *distance <= limit)
 }
+
+pub(crate) use init::scalar_bytes;
+pub(crate) use fold::NS_PER_MS;
