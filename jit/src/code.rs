@@ -181,7 +181,8 @@ impl Assembly {
     ) -> Result<Self, JitError> {
         let mut builder = JITBuilder::with_isa(isa, Box::new(|call| format!("{call:?}")));
         let reserved = instructions.saturating_mul(RESERVED_PER_INSTRUCTION).saturating_add(RESERVED_ALWAYS);
-        let arena = ArenaMemoryProvider::new_with_size(reserved).map_err(|error| JitError::Memory(error.to_string()))?;
+        let arena =
+            ArenaMemoryProvider::new_with_size(reserved).map_err(|error| JitError::Memory(error.to_string()))?;
         builder.memory_provider(Box::new(arena));
         for routine in runtime::all() {
             builder.symbol(routine.name, routine.address);

@@ -20,7 +20,6 @@ pub mod mir;
 pub mod passes;
 pub mod text;
 
-
 mod code;
 mod plan;
 mod run;
@@ -36,7 +35,6 @@ pub use code::Handle;
 pub use passes::Passes;
 pub use run::Jit;
 pub use text::{asm_text, clif_text, mir_text};
-
 
 /// What code is made like.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -98,6 +96,7 @@ impl Jit {
         let scope = plan::scope(&verified, layout);
         let plan = plan::Plan::new(&scope);
         let (code, stack_bytes) = run::compile(&scope, &plan, options)?;
-        Jit::from_code(&scope, &plan, Arc::new(code), stack_bytes)
+        let parts = run::Parts::new(&scope, &plan, Arc::new(code), stack_bytes)?;
+        Ok(Jit::from_parts(verified, parts))
     }
 }

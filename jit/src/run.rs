@@ -7,6 +7,7 @@ use cranelift_codegen::isa::OwnedTargetIsa;
 use cranelift_frontend::FunctionBuilderContext;
 use khz_bytecode::ids::FunctionId;
 use khz_bytecode::trap::TrapCode;
+use khz_bytecode::verify::Verified;
 use khz_machine::engine::{Engine, Entry, Limits};
 use khz_machine::image::Image;
 use khz_machine::instance_map::InstanceMap;
@@ -45,9 +46,8 @@ pub(crate) fn signatures(
 pub(crate) fn assembly(scope: &Scope<'_>, plan: &Plan, isa: OwnedTargetIsa) -> Result<Assembly, JitError> {
     let convention = isa.default_call_conv();
     let known = signatures(scope, plan, convention);
-    let signature = move |key: Key| {
-        known.get(&key).cloned().unwrap_or_else(|| cranelift_codegen::ir::Signature::new(convention))
-    };
+    let signature =
+        move |key: Key| known.get(&key).cloned().unwrap_or_else(|| cranelift_codegen::ir::Signature::new(convention));
     Assembly::new(isa, plan.instructions, Box::new(signature))
 }
 
@@ -97,9 +97,9 @@ fn stack_bytes(scope: &Scope<'_>, plan: &Plan, frames: &BTreeMap<Key, u32>) -> u
     chains.into_values().max().unwrap_or(0)
 }
 
-/// The native-code engine of one resource.
+/// What an engine runs with.
 #[derive(Debug)]
-pub struct Jit {
+pub(crate) struct Parts {
     init: Option<Handle>,
     startup: Option<Handle>,
     instances: Vec<Handle>,
@@ -110,8 +110,9 @@ pub struct Jit {
     code: Arc<Code>,
 }
 
-impl Jit {
-    pub(crate) fn from_code(scope: &Scope<'_>, plan: &Plan, code: Arc<Code>, stack_bytes: u64) -> Result<Jit, JitError> {
+impl Parts {
+    /// Handles of a plan's entries and the tables beside the code.
+    pub fn new(scope: &Scope<'_>, plan: &Plan, code: Arc<Code>, stack_bytes: u64) -> Result<Parts, JitError> {
         let handle = |entry: &EntryPoint| {
             let missing = JitError::Function { function: entry.key.0, reason: "it was not compiled".into() };
             Handle::new(Arc::clone(&code), entry.key, entry.shared).ok_or(missing)
@@ -121,7 +122,7 @@ impl Jit {
             code: code.address((function, ProgramMemory::None)).unwrap_or(std::ptr::null()),
             frame_bytes: scope.verified.function(function).frame_bytes,
         });
-        Ok(Jit {
+        Ok(Parts {
             init: plan.init.as_ref().map(handle).transpose()?,
             startup: plan.startup.as_ref().map(handle).transpose()?,
             instances: plan.instances.iter().map(handle).collect::<Result<_, _>>()?,
@@ -132,18 +133,37 @@ impl Jit {
             code,
         })
     }
+}
+
+/// The native-code engine of one resource.
+#[derive(Debug)]
+pub struct Jit {
+    verified: Arc<Verified>,
+    parts: Parts,
+}
+
+impl Jit {
+    pub(crate) fn from_parts(verified: Arc<Verified>, parts: Parts) -> Jit {
+        Jit { verified, parts }
+    }
+
+    /// What it was compiled from.
+    #[must_use]
+    pub fn verified(&self) -> &Arc<Verified> {
+        &self.verified
+    }
 
     /// Bytes of native stack that the deepest nesting of calls may need, at most [`MAX_STACK_BYTES`].
     #[must_use]
     pub fn stack_bytes(&self) -> u64 {
-        self.stack_bytes
+        self.parts.stack_bytes
     }
 
     fn handle(&self, entry: Entry) -> Option<&Handle> {
         match entry {
-            Entry::Init => self.init.as_ref(),
-            Entry::Startup => self.startup.as_ref(),
-            Entry::Instance(position) => self.instances.get(position),
+            Entry::Init => self.parts.init.as_ref(),
+            Entry::Startup => self.parts.startup.as_ref(),
+            Entry::Instance(position) => self.parts.instances.get(position),
         }
     }
 
@@ -170,7 +190,7 @@ impl Jit {
     }
 
     fn place(&self, number: u32) -> (CodePlace, Option<u32>) {
-        let entry = self.code.places.get(number as usize);
+        let entry = self.parts.code.places.get(number as usize);
         entry.map_or((CodePlace::default(), None), |entry| (entry.place, entry.caller))
     }
 }
@@ -184,9 +204,10 @@ impl Engine for Jit {
     /// When the container has no such entry, the image is not of the layout that the code was compiled for, or there is no such task.
     fn run(&mut self, entry: Entry, image: &mut Image, limits: Limits<'_>) -> Result<(), Trap> {
         let handle = self.handle(entry).expect("the scheduler runs only entries that the container has");
-        let frame = self.frames.get(limits.task_index).expect("the scheduler names only tasks that the container has");
+        let frame =
+            self.parts.frames.get(limits.task_index).expect("the scheduler names only tasks that the container has");
         let bytes = image.bytes_mut();
-        assert!(bytes.len() == self.image_bytes as usize, "the image is of another layout than the code");
+        assert!(bytes.len() == self.parts.image_bytes as usize, "the image is of another layout than the code");
         let start = bytes.as_mut_ptr();
         let mut context = Context {
             deadline: limits.deadline.as_atomic(),
@@ -199,7 +220,7 @@ impl Engine for Jit {
             frame_limit: start.wrapping_add(frame.end as usize),
             image: start,
             image_bytes: bytes.len() as u64,
-            virtuals: &raw const *self.virtuals,
+            virtuals: &raw const *self.parts.virtuals,
             found_code: std::ptr::null(),
             found_frame_bytes: 0,
             chain: [0; khz_bytecode::limits::MAX_TRAP_CHAIN + 1],
@@ -216,6 +237,6 @@ impl Engine for Jit {
     }
 
     fn code_bytes(&self) -> usize {
-        self.code.bytes()
+        self.parts.code.bytes()
     }
 }

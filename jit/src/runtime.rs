@@ -122,13 +122,27 @@ unsafe fn image<'a>(context: *mut Context) -> &'a mut [u8] {
 
 /// Rust type of an operand as native code passes it.
 macro_rules! abi {
-    (Dst) => { u64 };
-    (Src) => { u64 };
-    (I32) => { i32 };
-    (I64) => { i64 };
-    (F32) => { f32 };
-    (F64) => { f64 };
-    (Nothing) => { () };
+    (Dst) => {
+        u64
+    };
+    (Src) => {
+        u64
+    };
+    (I32) => {
+        i32
+    };
+    (I64) => {
+        i64
+    };
+    (F32) => {
+        f32
+    };
+    (F64) => {
+        f64
+    };
+    (Nothing) => {
+        ()
+    };
 }
 macro_rules! pass {
     (Dst, $value:ident) => {

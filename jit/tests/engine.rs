@@ -53,7 +53,11 @@ fn traps_write_back_what_registers_hold() {
         ("address d a v\nslot.load g i\nref.index v\nconst.i32 1\nref.store i32\n", TrapCode::ArrayIndex, [5, 0, 4]),
         ("const.i32 7\nslot.load g i\nconst.i32 5\ni32.sub\ni32.div_s\ndrop\n", TrapCode::DivideByZero, [0; 3]),
         ("slot.load g i\ncheck.i32 i32 0 4\ndrop\n", TrapCode::Range, [5, 0, 4]),
-        ("slot.load g i\nconst.i32 5\ni32.ne\ni64.extend_i32_s\nconst i64 16\ni64.mul\nref.check n 0\ndrop\n", TrapCode::Reference, [0; 3]),
+        (
+            "slot.load g i\nconst.i32 5\ni32.ne\ni64.extend_i32_s\nconst i64 16\ni64.mul\nref.check n 0\ndrop\n",
+            TrapCode::Reference,
+            [0; 3],
+        ),
         ("slot.load g i\ncall g\n", TrapCode::DivideByZero, [0; 3]),
     ];
     for (code, trap_code, values) in cases {
@@ -81,7 +85,8 @@ fn the_chain_names_the_calls_innermost_first() {
 
 #[test]
 fn an_endless_loop_ends_when_another_thread_says_so() {
-    let text = "global n i32\nfunction main\ntop:\nslot.load g n\nconst.i32 1\ni32.add\nslot.store g n\njump top\nend\n";
+    let text =
+        "global n i32\nfunction main\ntop:\nslot.load g n\nconst.i32 1\ni32.add\nslot.store g n\njump top\nend\n";
     let mut run = load(text, false);
     let deadline = DeadlineCell::new();
     let other = deadline.clone();
@@ -98,7 +103,8 @@ fn an_endless_loop_ends_when_another_thread_says_so() {
 
 #[test]
 fn fuel_runs_out_at_the_same_place_every_time() {
-    let text = "global n i32\nfunction main\ntop:\nslot.load g n\nconst.i32 1\ni32.add\nslot.store g n\njump top\nend\n";
+    let text =
+        "global n i32\nfunction main\ntop:\nslot.load g n\nconst.i32 1\ni32.add\nslot.store g n\njump top\nend\n";
     let mut run = load(text, true);
     let (result, left) = run.run_with_fuel(52);
     assert_eq!((result.unwrap_err().code, left), (TrapCode::Watchdog, 0));
@@ -144,7 +150,10 @@ fn virtual_calls_recurse_down_to_the_limit_without_harm() {
 #[test]
 fn a_run_allocates_nothing() {
     let strings = "type s string 20\ndata t s\n";
-    let text = format!("{strings}{}", summing("address d t s\nslot.load g i\ni64.extend_i32_s\nstring.from_i64 20\nslot.load g i\ncall g\n"));
+    let text = format!(
+        "{strings}{}",
+        summing("address d t s\nslot.load g i\ni64.extend_i32_s\nstring.from_i64 20\nslot.load g i\ncall g\n")
+    );
     let mut run = load(&text, true);
     let deadline = DeadlineCell::new();
     for _ in 0..3 {

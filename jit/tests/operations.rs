@@ -28,7 +28,8 @@ fn edges(ty: ValueType) -> Vec<Value> {
             bits.into_iter().chain(plain).map(Value::F32).collect()
         }
         ValueType::F64 => {
-            let bits = [0xFFF8_0000_0000_0000, 1, 0x7FEF_FFFF_FFFF_FFFF, 0x7FF0 << 48, 0xFFF0 << 48].map(f64::from_bits);
+            let bits =
+                [0xFFF8_0000_0000_0000, 1, 0x7FEF_FFFF_FFFF_FFFF, 0x7FF0 << 48, 0xFFF0 << 48].map(f64::from_bits);
             let plain = [0.0, -0.0, 1.0, -1.5, 0.5, 2.5, -128.6, 4_294_967_295.5, 2_147_483_647.5, 9.3e18, -1e19, 1e40];
             bits.into_iter().chain(plain).map(Value::F64).collect()
         }

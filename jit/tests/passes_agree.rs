@@ -27,8 +27,19 @@ const SLOTS: &[&str] = &["g a", "g b", "g c", "g w", "p d", "p e", "p n", "l x",
 const CONTROLS: &[(&str, &str)] =
     &[("g a", "i32"), ("p n", "i16"), ("l x", "i32"), ("g s", "u8"), ("p d", "u32"), ("p t", "i8")];
 const PURE: &[&str] = &[
-    "i32.add", "i32.sub", "i32.mul", "i32.and", "i32.or", "i32.xor", "i32.lt_s", "i32.ge_u", "i32.eq", "i32.shl",
-    "i32.shr_u", "i32.min_s", "i32.rotr8",
+    "i32.add",
+    "i32.sub",
+    "i32.mul",
+    "i32.and",
+    "i32.or",
+    "i32.xor",
+    "i32.lt_s",
+    "i32.ge_u",
+    "i32.eq",
+    "i32.shl",
+    "i32.shr_u",
+    "i32.min_s",
+    "i32.rotr8",
 ];
 
 struct Writer {
@@ -165,10 +176,22 @@ impl Writer {
         let (slot, ty) = CONTROLS[self.random.next(CONTROLS.len() as u64) as usize];
         let _ = writeln!(self.for_lines, "for {name} {slot} {ty}");
         self.depth += 1;
-        if self.random.next(4) == 0 { self.expression(1) } else { self.constant() }
-        if self.random.next(3) == 0 { self.expression(1) } else { self.constant() }
+        if self.random.next(4) == 0 {
+            self.expression(1);
+        } else {
+            self.constant();
+        }
+        if self.random.next(3) == 0 {
+            self.expression(1);
+        } else {
+            self.constant();
+        }
         let step = self.random.one(&["1", "1", "2", "-1", "-3", "100"]);
-        if self.random.next(6) == 0 { self.expression(0) } else { self.line(&format!("const.i32 {step}")) }
+        if self.random.next(6) == 0 {
+            self.expression(0);
+        } else {
+            self.line(&format!("const.i32 {step}"));
+        }
         self.line(&format!("for.enter {name} {end}"));
         self.line(&format!("{pass}:"));
         self.block(3);

@@ -88,7 +88,8 @@ impl Builder<'_> {
 
     fn slot_load(&mut self, place: SlotPlace, index: SlotIndex) {
         if place == SlotPlace::Local {
-            let value = self.define(self.out.variables[self.locals[index.index()].index()], Op::Get(self.locals[index.index()]));
+            let value = self
+                .define(self.out.variables[self.locals[index.index()].index()], Op::Get(self.locals[index.index()]));
             match self.code.locals[index.index()] {
                 LocalType::Scalar(_) => self.push(value),
                 LocalType::Ref(ty) => self.stack.push(Entry::Ref(self.at(Base::Value(value), 0), ty.image)),
@@ -161,9 +162,9 @@ impl Builder<'_> {
 
     fn ref_field(&mut self, owner: TypeId, field: u16) {
         let (mut address, image) = self.pop_ref();
-        let record = match &self.scope.verified.container().types.types[owner.index()] {
-            MemoryType::Struct(record) | MemoryType::Union(record) | MemoryType::Block { record, .. } => record,
-            _ => unreachable!("the verifier proved that the owner is a record"),
+        let ty = &self.scope.verified.container().types.types[owner.index()];
+        let (MemoryType::Struct(record) | MemoryType::Union(record) | MemoryType::Block { record, .. }) = ty else {
+            unreachable!("the verifier proved that the owner is a record")
         };
         address.displacement = address.displacement.wrapping_add(i64::from(record.fields[usize::from(field)].offset));
         self.stack.push(Entry::Ref(address, image));

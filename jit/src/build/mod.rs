@@ -340,7 +340,9 @@ impl<'a> Builder<'a> {
             Type::F32 => self.constant(Const::F32(0)),
             Type::F64 => self.constant(Const::F64(0)),
             // Never read: a reference is assigned on every path before its use.
-            Type::Ref => self.define(Type::Ref, Op::Reference(Address { base: Base::Image, displacement: 0, index: None })),
+            Type::Ref => {
+                self.define(Type::Ref, Op::Reference(Address { base: Base::Image, displacement: 0, index: None }))
+            }
         }
     }
 

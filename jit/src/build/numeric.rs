@@ -82,7 +82,9 @@ impl Builder<'_> {
     }
 
     fn helper(&mut self, op: HelperOp, capacities: [u16; MAX_CAPACITIES]) {
-        debug_assert!(op.operands().iter().filter(|o| matches!(o, HelperOperand::Dst | HelperOperand::Src)).count() <= 3);
+        debug_assert!(
+            op.operands().iter().filter(|o| matches!(o, HelperOperand::Dst | HelperOperand::Src)).count() <= 3
+        );
         let values = self.pop_many(op.operands().len());
         let op_code = Op::Helper(op, capacities, values);
         match op.result() {

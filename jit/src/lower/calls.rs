@@ -140,7 +140,13 @@ impl Lowerer<'_, '_> {
         }
     }
 
-    fn helper(&mut self, instruction: &Instruction, op: HelperOp, capacities: [u16; MAX_CAPACITIES], operands: &[Value]) {
+    fn helper(
+        &mut self,
+        instruction: &Instruction,
+        op: HelperOp,
+        capacities: [u16; MAX_CAPACITIES],
+        operands: &[Value],
+    ) {
         let mut capacities = capacities.into_iter();
         let mut types = vec![types::I64];
         let mut arguments = vec![self.context];

@@ -89,9 +89,7 @@ impl Lowerer<'_, '_> {
         let at = |first: u32| ((first + u32::from(slot.index.0)) * SLOT_BYTES) as i32;
         let start = self.scope.layout.slots.start as i32;
         match (slot.place, self.program, self.function.program) {
-            (SlotPlace::Program, ProgramMemory::Instance { slots, .. }, _) => {
-                (self.image, (start + at(slots)).into())
-            }
+            (SlotPlace::Program, ProgramMemory::Instance { slots, .. }, _) => (self.image, (start + at(slots)).into()),
             (SlotPlace::Program, _, Some((slots, _))) => (self.value(slots), at(0).into()),
             _ => (self.image, (start + at(0)).into()),
         }

@@ -10,8 +10,8 @@ mod memory;
 mod numeric;
 
 use cranelift_codegen::ir::{
-    self, AbiParam, AliasRegion, AliasRegionData, BlockArg, BlockCall, InstBuilder, JumpTableData, MemFlagsData, Signature,
-    types,
+    self, AbiParam, AliasRegion, AliasRegionData, BlockArg, BlockCall, InstBuilder, JumpTableData, MemFlagsData,
+    Signature, types,
 };
 use cranelift_codegen::isa::CallConv;
 use cranelift_frontend::{FunctionBuilder, FunctionBuilderContext, Variable};

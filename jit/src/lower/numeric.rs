@@ -160,8 +160,7 @@ impl Lowerer<'_, '_> {
 
     fn rotate_narrow(&mut self, a: ir::Value, count: ir::Value, ty: ir::Type, left: bool) -> ir::Value {
         let low = self.builder.ins().ireduce(ty, a);
-        let rotated =
-            if left { self.builder.ins().rotl(low, count) } else { self.builder.ins().rotr(low, count) };
+        let rotated = if left { self.builder.ins().rotl(low, count) } else { self.builder.ins().rotr(low, count) };
         self.builder.ins().uextend(types::I32, rotated)
     }
 
@@ -285,22 +284,22 @@ impl Lowerer<'_, '_> {
         use NumericOp as N;
         use Rounding::{Cut, Nearest};
         Some(match op {
-            N::F32RoundI8 | N::F64RoundI8 => self.to_narrow(a, Nearest, -128, 127),
-            N::F32RoundU8 | N::F64RoundU8 => self.to_narrow(a, Nearest, 0, 255),
-            N::F32RoundI16 | N::F64RoundI16 => self.to_narrow(a, Nearest, -32768, 32767),
-            N::F32RoundU16 | N::F64RoundU16 => self.to_narrow(a, Nearest, 0, 65535),
-            N::F32RoundI32 | N::F64RoundI32 => self.to_signed(a, Nearest, types::I32),
-            N::F32RoundU32 | N::F64RoundU32 => self.to_unsigned(a, Nearest, types::I32),
-            N::F32RoundI64 | N::F64RoundI64 => self.to_signed(a, Nearest, types::I64),
-            N::F32RoundU64 | N::F64RoundU64 => self.to_unsigned(a, Nearest, types::I64),
-            N::F32TruncI8 | N::F64TruncI8 => self.to_narrow(a, Cut, -128, 127),
-            N::F32TruncU8 | N::F64TruncU8 => self.to_narrow(a, Cut, 0, 255),
-            N::F32TruncI16 | N::F64TruncI16 => self.to_narrow(a, Cut, -32768, 32767),
-            N::F32TruncU16 | N::F64TruncU16 => self.to_narrow(a, Cut, 0, 65535),
-            N::F32TruncI32 | N::F64TruncI32 => self.to_signed(a, Cut, types::I32),
-            N::F32TruncU32 | N::F64TruncU32 => self.to_unsigned(a, Cut, types::I32),
-            N::F32TruncI64 | N::F64TruncI64 => self.to_signed(a, Cut, types::I64),
-            N::F32TruncU64 | N::F64TruncU64 => self.to_unsigned(a, Cut, types::I64),
+            N::F32RoundI8 | N::F64RoundI8 => self.narrow_from(a, Nearest, -128, 127),
+            N::F32RoundU8 | N::F64RoundU8 => self.narrow_from(a, Nearest, 0, 255),
+            N::F32RoundI16 | N::F64RoundI16 => self.narrow_from(a, Nearest, -32768, 32767),
+            N::F32RoundU16 | N::F64RoundU16 => self.narrow_from(a, Nearest, 0, 65535),
+            N::F32RoundI32 | N::F64RoundI32 => self.signed_from(a, Nearest, types::I32),
+            N::F32RoundU32 | N::F64RoundU32 => self.unsigned_from(a, Nearest, types::I32),
+            N::F32RoundI64 | N::F64RoundI64 => self.signed_from(a, Nearest, types::I64),
+            N::F32RoundU64 | N::F64RoundU64 => self.unsigned_from(a, Nearest, types::I64),
+            N::F32TruncI8 | N::F64TruncI8 => self.narrow_from(a, Cut, -128, 127),
+            N::F32TruncU8 | N::F64TruncU8 => self.narrow_from(a, Cut, 0, 255),
+            N::F32TruncI16 | N::F64TruncI16 => self.narrow_from(a, Cut, -32768, 32767),
+            N::F32TruncU16 | N::F64TruncU16 => self.narrow_from(a, Cut, 0, 65535),
+            N::F32TruncI32 | N::F64TruncI32 => self.signed_from(a, Cut, types::I32),
+            N::F32TruncU32 | N::F64TruncU32 => self.unsigned_from(a, Cut, types::I32),
+            N::F32TruncI64 | N::F64TruncI64 => self.signed_from(a, Cut, types::I64),
+            N::F32TruncU64 | N::F64TruncU64 => self.unsigned_from(a, Cut, types::I64),
             _ => return None,
         })
     }
@@ -309,19 +308,19 @@ impl Lowerer<'_, '_> {
         if rounding == Rounding::Nearest { self.builder.ins().nearest(a) } else { a }
     }
 
-    fn to_signed(&mut self, a: ir::Value, rounding: Rounding, ty: ir::Type) -> ir::Value {
+    fn signed_from(&mut self, a: ir::Value, rounding: Rounding, ty: ir::Type) -> ir::Value {
         let a = self.rounded(a, rounding);
         self.builder.ins().fcvt_to_sint_sat(ty, a)
     }
 
-    fn to_unsigned(&mut self, a: ir::Value, rounding: Rounding, ty: ir::Type) -> ir::Value {
+    fn unsigned_from(&mut self, a: ir::Value, rounding: Rounding, ty: ir::Type) -> ir::Value {
         let a = self.rounded(a, rounding);
         self.builder.ins().fcvt_to_uint_sat(ty, a)
     }
 
     /// What saturates at an i32 saturates at a narrower type when it is cut to that type's range afterwards.
-    fn to_narrow(&mut self, a: ir::Value, rounding: Rounding, low: i32, high: i32) -> ir::Value {
-        let value = self.to_signed(a, rounding, types::I32);
+    fn narrow_from(&mut self, a: ir::Value, rounding: Rounding, low: i32, high: i32) -> ir::Value {
+        let value = self.signed_from(a, rounding, types::I32);
         let (low, high) = (self.i32(low), self.i32(high));
         let value = self.builder.ins().smax(value, low);
         self.builder.ins().smin(value, high)

@@ -583,7 +583,9 @@ impl Op {
                 address(destination, &mut f);
                 address(source, &mut f);
             }
-            Op::Helper(_, _, values) | Op::Call(_, values) | Op::CallVirtual(_, values) => values.iter_mut().for_each(f),
+            Op::Helper(_, _, values) | Op::Call(_, values) | Op::CallVirtual(_, values) => {
+                values.iter_mut().for_each(f);
+            }
         }
     }
 }

@@ -3,8 +3,8 @@
 use std::fmt::{self, Display, Formatter, Write};
 
 use super::{
-    Access, Address, Base, BlockData, Const, Control, ForTest, Function, Instruction, Op, Operands, Place, Slot, Target,
-    Terminator, Type, Value,
+    Access, Address, Base, BlockData, Const, Control, ForTest, Function, Instruction, Op, Operands, Place, Slot,
+    Target, Terminator, Type, Value,
 };
 
 impl Display for Type {
@@ -201,7 +201,11 @@ impl Function {
                     Control::Slot(slot) => slot.to_string(),
                     Control::Memory => "memory".into(),
                 };
-                write!(f, " counts {} {control} from {} to {} by {}", counted.ty, counted.initial, counted.bound, counted.step)?;
+                write!(
+                    f,
+                    " counts {} {control} from {} to {} by {}",
+                    counted.ty, counted.initial, counted.bound, counted.step
+                )?;
             }
             f.write_char('\n')?;
         }

@@ -2,7 +2,9 @@
 //!
 //! [`run`] gives the order, [`Passes`] switches them one by one, for measuring and for finding a fault. Each is linear in the size of the function.
 
+pub mod bools;
 pub mod checks;
+pub mod deadlines;
 pub mod fold;
 pub mod for_loops;
 pub mod if_convert;
@@ -49,8 +51,12 @@ passes! {
     for_loops;
     /// [`checks`]: guards that can not fire.
     checks;
+    /// [`deadlines`]: no look at the deadline in loops that are short by proof.
+    deadlines;
     /// [`if_convert`]: short integer IFs as selects.
     if_convert;
+    /// [`bools`]: NOT of a BOOL without a test.
+    bools;
 }
 
 impl Default for Passes {
@@ -70,6 +76,9 @@ pub fn run(function: &mut Function, verified: &Verified, passes: Passes) {
     if passes.checks {
         checks::run(function);
     }
+    if passes.deadlines {
+        deadlines::run(function);
+    }
     if passes.for_loops {
         for_loops::run(function);
     }
@@ -78,5 +87,8 @@ pub fn run(function: &mut Function, verified: &Verified, passes: Passes) {
     }
     if passes.if_convert {
         if_convert::run(function);
+    }
+    if passes.bools {
+        bools::run(function);
     }
 }

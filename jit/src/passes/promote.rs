@@ -10,8 +10,8 @@ use khz_bytecode::value::{SlotPlace, Storage};
 use khz_bytecode::verify::Verified;
 
 use crate::mir::{
-    Access, Block, BlockData, Control, Dirty, Function, Instruction, LoopId, Op, Place, Results, Slot, Target, Terminator,
-    Value, Var, WriteBack,
+    Access, Block, BlockData, Control, Dirty, Function, Instruction, LoopId, Op, Place, Results, Slot, Target,
+    Terminator, Value, Var, WriteBack,
 };
 
 /// Most slots that one loop takes into variables.
@@ -91,7 +91,8 @@ fn loops_of_level(function: &Function, level: usize) -> Vec<(LoopId, Vec<usize>)
     for (number, data) in function.loops.iter().enumerate() {
         let parent = data.parent.map(LoopId::index).filter(|parent| *parent < number);
         depth[number] = parent.map_or(0, |parent| depth[parent] + 1);
-        around[number] = if depth[number] == level { Some(LoopId(number as u32)) } else { parent.and_then(|p| around[p]) };
+        around[number] =
+            if depth[number] == level { Some(LoopId(number as u32)) } else { parent.and_then(|p| around[p]) };
     }
     let mut blocks: BTreeMap<LoopId, Vec<usize>> = BTreeMap::new();
     for (number, block) in function.blocks.iter().enumerate() {
@@ -245,9 +246,8 @@ fn enter(function: &mut Function, id: LoopId, inside: &BTreeSet<usize>, held: &B
         instructions.push(Instruction { op: Op::LoadSlot(*slot, *access), results: Results::One(value), place });
         instructions.push(Instruction { op: Op::Set(*var, value), results: Results::None, place });
     }
-    let write_back = parent.map_or(WriteBack(0), |parent| {
-        function.blocks[function.loops[parent.index()].header.index()].write_back
-    });
+    let write_back =
+        parent.map_or(WriteBack(0), |parent| function.blocks[function.loops[parent.index()].header.index()].write_back);
     let terminator = Terminator::Jump(Target { block: header, arguments: parameters.clone() });
     let entrance =
         function.add_block(BlockData { parameters, instructions, terminator, innermost_loop: parent, write_back });

@@ -145,7 +145,9 @@ impl<'a> Walk<'a> {
             Op::Get(var) => self.get(block, *var, all),
             Op::LoadSlot(slot, access) => {
                 let own = Interval::of_storage(access.storage);
-                self.control(block, |control| control == Control::Slot(*slot)).filter(|c| c.is_inside(own)).unwrap_or(own)
+                self.control(block, |control| control == Control::Slot(*slot))
+                    .filter(|c| c.is_inside(own))
+                    .unwrap_or(own)
             }
             Op::Load(_, access) => Interval::of_storage(access.storage),
             Op::LoadBit(..) | Op::ForIsEmpty(_) | Op::ForContinues(_) => Interval::BOOL,
@@ -252,9 +254,41 @@ fn is_comparison(op: NumericOp) -> bool {
     use NumericOp as N;
     matches!(
         op,
-        N::I32Eq | N::I32Ne | N::I32LtS | N::I32LtU | N::I32LeS | N::I32LeU | N::I32GtS | N::I32GtU | N::I32GeS | N::I32GeU
-            | N::I32Eqz | N::I32Nez | N::I64Eq | N::I64Ne | N::I64LtS | N::I64LtU | N::I64LeS | N::I64LeU | N::I64GtS
-            | N::I64GtU | N::I64GeS | N::I64GeU | N::I64Eqz | N::I64Nez | N::F32Eq | N::F32Ne | N::F32Lt | N::F32Le
-            | N::F32Gt | N::F32Ge | N::F64Eq | N::F64Ne | N::F64Lt | N::F64Le | N::F64Gt | N::F64Ge
+        N::I32Eq
+            | N::I32Ne
+            | N::I32LtS
+            | N::I32LtU
+            | N::I32LeS
+            | N::I32LeU
+            | N::I32GtS
+            | N::I32GtU
+            | N::I32GeS
+            | N::I32GeU
+            | N::I32Eqz
+            | N::I32Nez
+            | N::I64Eq
+            | N::I64Ne
+            | N::I64LtS
+            | N::I64LtU
+            | N::I64LeS
+            | N::I64LeU
+            | N::I64GtS
+            | N::I64GtU
+            | N::I64GeS
+            | N::I64GeU
+            | N::I64Eqz
+            | N::I64Nez
+            | N::F32Eq
+            | N::F32Ne
+            | N::F32Lt
+            | N::F32Le
+            | N::F32Gt
+            | N::F32Ge
+            | N::F64Eq
+            | N::F64Ne
+            | N::F64Lt
+            | N::F64Le
+            | N::F64Gt
+            | N::F64Ge
     )
 }

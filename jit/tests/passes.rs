@@ -1,0 +1,130 @@
+//! The mid-level form before and after each pass.
+
+mod common;
+
+use common::form;
+use khz_jit::Passes;
+
+/// An array summed by a FOR loop over a slot of the program.
+const SUM: &str = "global sum i32\ntype n scalar i32\narray v n 0..9\ndata a v\nprogram p_\nslot i i32\nslot flag b1\n\
+    function main program p_\nfor k p i i32\nconst.i32 0\nconst.i32 9\nconst.i32 1\nfor.enter k out\ntop:\n\
+    slot.load g sum\naddress d a v\nslot.load p i\nref.index v\nref.load i32\ni32.add\nslot.store g sum\n\
+    for.next k top\nout:\nreturn\nend\n";
+
+fn only(names: &[&str]) -> Passes {
+    names.iter().fold(Passes::NONE, |passes, name| passes.with(name).unwrap())
+}
+
+fn count(form: &str, what: &str) -> usize {
+    form.lines().filter(|line| line.contains(what)).count()
+}
+
+#[test]
+fn without_passes_each_instruction_stands_as_it_was() {
+    let form = form(SUM, Passes::NONE);
+    assert_eq!(count(&form, "check.index"), 1, "{form}");
+    assert_eq!((count(&form, "slot.load g0"), count(&form, "slot.load p0")), (1, 2), "{form}");
+    assert_eq!((count(&form, "for.is_empty"), count(&form, "for.continues")), (1, 1), "{form}");
+    assert!(form.contains("loop0: header b2 counts i32 p0"), "{form}");
+}
+
+#[test]
+fn promotion_loads_before_the_loop_and_stores_behind_it() {
+    let form = form(SUM, only(&["promote"]));
+    // One load in front, one store behind; in front of it the store of `for.enter`.
+    assert_eq!((count(&form, "slot.load g0"), count(&form, "slot.load p0")), (1, 1), "{form}");
+    assert_eq!((count(&form, "slot.store g0"), count(&form, "slot.store p0")), (1, 2), "{form}");
+    assert!(form.contains("traps w1") && form.contains("->g0") && form.contains("->p0"), "{form}");
+}
+
+#[test]
+fn a_slot_that_a_callee_touches_stays_in_memory() {
+    let text = SUM.replace("for.next", "call f\nfor.next") + "function f\nslot.load g sum\ndrop\nreturn\nend\n";
+    let form = form(&text, only(&["promote"]));
+    assert!(count(&form, "slot.store g0") == 1 && !form.contains("->g0") && form.contains("->p0"), "{form}");
+}
+
+#[test]
+fn a_for_loop_proves_its_index() {
+    let checks = |text: &str| count(&form(text, only(&["promote", "fold", "checks"])), "check.index");
+    assert_eq!(checks(SUM), 0);
+    // Ten is outside; a body that writes the control variable proves nothing.
+    assert_eq!(checks(&SUM.replace("const.i32 9", "const.i32 10")), 1);
+    assert_eq!(checks(&SUM.replace("for.next", "slot.load g sum\nslot.store p i\nfor.next")), 1);
+}
+
+#[test]
+fn masks_and_remainders_prove_an_index() {
+    let checks = |index: &str| {
+        let text = SUM.replace("slot.load p i\nref", &format!("slot.load g sum\n{index}ref"));
+        count(&form(&text, only(&["checks"])), "check.index")
+    };
+    assert_eq!(checks("const.i32 7\ni32.and\n"), 0);
+    assert_eq!(checks("const.i32 10\ni32.rem_u\n"), 0);
+    assert_eq!(checks("const.i32 10\ni32.rem_s\n"), 1, "the remainder may be negative");
+    assert_eq!(checks("const.i32 15\ni32.and\n"), 1);
+}
+
+#[test]
+fn a_for_loop_becomes_arithmetic_over_an_i64() {
+    let form = form(SUM, only(&["promote", "fold", "for_loops"]));
+    assert_eq!(count(&form, "for."), 0, "{form}");
+    assert_eq!((count(&form, "i32.le_s"), count(&form, "i64.add")), (1, 1), "{form}");
+    // The index needs no extension; that of the first value is folded.
+    assert_eq!((count(&form, "i64.extend_i32_s"), count(&form, "[image +80 + v")), (0, 1), "{form}");
+}
+
+#[test]
+fn folding_computes_what_is_known_and_drops_wraps_that_change_nothing() {
+    let text = "global r i32\nglobal f b1\nfunction main\nconst.i32 6\nconst.i32 7\ni32.mul\nslot.store g r\n\
+        slot.load g r\nconst.i32 3\ni32.lt_s\nslot.store g f\nconst.i32 0\njump.if never\nreturn\nnever:\nreturn\nend\n";
+    let before = form(text, Passes::NONE);
+    let after = form(text, only(&["fold"]));
+    assert_eq!((count(&before, "i32.mul"), count(&before, "i32.nez"), count(&before, "branch")), (1, 1, 1), "{before}");
+    assert_eq!((count(&after, "i32.mul"), count(&after, "i32.nez"), count(&after, "branch")), (0, 0, 0), "{after}");
+    assert_eq!(count(&after, "i32 42"), 1, "{after}");
+}
+
+#[test]
+fn a_division_by_zero_is_not_folded_away() {
+    let text = "global r i32\nfunction main\nconst.i32 6\nconst.i32 0\ni32.div_s\nslot.store g r\nreturn\nend\n";
+    let after = form(text, Passes::ALL);
+    assert_eq!((count(&after, "check.divisor"), count(&after, "i32.div_s")), (1, 1), "{after}");
+}
+
+#[test]
+fn a_short_if_over_integers_becomes_a_select() {
+    let text = |arm: &str| {
+        format!(
+            "global c i32\nglobal x f32\nfunction main\nlocal k i32\nfor loop l k i32\nconst.i32 0\nconst.i32 7\nconst.i32 1\nfor.enter loop out\n\
+             top:\nslot.load g c\nconst.i32 1\ni32.and\njump.unless other\n{arm}jump end_\nother:\nslot.load g c\nconst.i32 1\n\
+             i32.shr_u\nslot.store g c\nend_:\nfor.next loop top\nout:\nreturn\nend\n"
+        )
+    };
+    let short = "slot.load g c\nconst.i32 1\ni32.shr_u\nconst.i32 12345\ni32.xor\nslot.store g c\n";
+    let converted = form(&text(short), Passes::ALL);
+    assert_eq!(count(&converted, "select"), 1, "{converted}");
+    for other in ["const f32 1.0\nslot.store g x\n", "const.i32 1\nslot.load g c\ni32.div_u\nslot.store g c\n"] {
+        let kept = form(&text(other), Passes::ALL);
+        assert_eq!(count(&kept, "select"), 0, "{kept}");
+    }
+}
+
+#[test]
+fn a_loop_that_is_short_by_proof_does_not_look_at_the_deadline() {
+    let looks = |text: &str| count(&form(text, only(&["deadlines"])), "no deadline");
+    assert_eq!(looks(SUM), 1);
+    assert_eq!(looks(&SUM.replace("const.i32 9", "const.i32 100000")), 0);
+    assert_eq!(looks(&SUM.replace("const.i32 9", "slot.load g sum")), 0);
+    let calling = SUM.replace("for.next", "call f\nfor.next") + "function f\nslot.load g sum\ndrop\nreturn\nend\n";
+    assert_eq!(looks(&calling), 0);
+    assert_eq!(looks("function main\ntop:\njump top\nend\n"), 0);
+}
+
+#[test]
+fn not_of_a_bool_needs_no_test_unless_a_branch_asks() {
+    let text = "global a b1\nglobal b b1\nglobal n i32\nfunction main\nslot.load g a\ni32.eqz\nslot.store g b\n\
+        slot.load g n\ni32.eqz\nslot.store g b\nslot.load g a\ni32.eqz\njump.if end_\nnop\nend_:\nreturn\nend\n";
+    let form = form(text, only(&["fold", "bools"]));
+    assert_eq!((count(&form, "i32.xor"), count(&form, "i32.eqz")), (1, 2), "{form}");
+}
