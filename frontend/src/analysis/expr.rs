@@ -427,7 +427,7 @@ impl<'c, 'a> Checker<'c, 'a> {
 
     fn no_operator(&mut self, op: BinOp, a: Ty, b: Ty, span: Span) -> Expr {
         let (x, y) = (self.an.types.name(a), self.an.types.name(b));
-        self.an.report(&rules::OPERATOR, span, format!("{op:?} is not defined for {x} and {y}"));
+        self.an.report(&rules::OPERATOR, span, format!("{} is not defined for {x} and {y}", op.text()));
         broken(span)
     }
 
@@ -457,7 +457,7 @@ impl<'c, 'a> Checker<'c, 'a> {
         let arithmetic = matches!(op, BinOp::Add | BinOp::Sub | BinOp::Mul | BinOp::Div | BinOp::Mod);
         let logical = matches!(op, BinOp::And | BinOp::Or | BinOp::Xor);
         if (arithmetic && is_bits(elementary)) || (logical && (is_signed(elementary) || is_unsigned(elementary))) {
-            let message = format!("{op:?} on {} is a vendor's extension", elementary.name());
+            let message = format!("{} on {} is a vendor's extension", op.text(), elementary.name());
             self.an.report_vendor(&rules::BIT_ARITHMETIC, span, message);
         }
     }

@@ -140,10 +140,17 @@ impl<'a> Checker<'_, 'a> {
             let _ = global;
             self.note_image(located, self.an.types.extent(ty).0);
         }
-        if ty == Ty::Error {
+        if ty == Ty::Error || self.external_differs(name.symbol, ty) {
             return None;
         }
         Some(Place { root, path: Vec::new(), ty, span })
+    }
+
+    /// Whether the unit's VAR_EXTERNAL is of another type than its global, which was reported there.
+    fn external_differs(&self, symbol: Symbol, ty: Ty) -> bool {
+        let scope = self.pou.and_then(|pou| self.an.scopes.get(pou.0 as usize));
+        let var = scope.and_then(|scope| scope.get(&symbol)).and_then(|id| self.info.as_ref()?.vars.get(id.0 as usize));
+        var.is_some_and(|var| var.class == VarClass::External && var.ty != ty)
     }
 
     /// The type of a root.

@@ -470,6 +470,36 @@ pub enum BinOp {
 }
 
 impl BinOp {
+    /// How messages call it.
+    pub fn text(self) -> &'static str {
+        match self {
+            BinOp::Add => "+",
+            BinOp::Sub => "-",
+            BinOp::Mul => "*",
+            BinOp::Div => "/",
+            BinOp::Mod => "MOD",
+            BinOp::Pow => "**",
+            BinOp::And => "AND",
+            BinOp::Or => "OR",
+            BinOp::Xor => "XOR",
+            BinOp::AndThen => "AND_THEN",
+            BinOp::OrElse => "OR_ELSE",
+            BinOp::Eq => "=",
+            BinOp::Ne => "<>",
+            BinOp::Lt => "<",
+            BinOp::Le => "<=",
+            BinOp::Gt => ">",
+            BinOp::Ge => ">=",
+            BinOp::Min => "MIN",
+            BinOp::Max => "MAX",
+            BinOp::Shl => "SHL",
+            BinOp::Shr => "SHR",
+            BinOp::Rol => "ROL",
+            BinOp::Ror => "ROR",
+            BinOp::Atan2 => "ATAN2",
+        }
+    }
+
     /// Whether it compares.
     pub fn is_comparison(self) -> bool {
         matches!(self, BinOp::Eq | BinOp::Ne | BinOp::Lt | BinOp::Le | BinOp::Gt | BinOp::Ge)

@@ -78,8 +78,8 @@ rules! {
     }
     NOT_A_VARIABLE = "S0015" Error "a variable is wanted" {
         "Only a variable, or a part of one, can be assigned to or connected."
-        wrong "PROGRAM p\nVAR\n  a : INT;\nEND_VAR\n  a + 1 := 2;\nEND_PROGRAM\n"
-        right "PROGRAM p\nVAR\n  a : INT;\nEND_VAR\n  a := 2;\nEND_PROGRAM\n"
+        wrong "FUNCTION f : INT\nVAR_IN_OUT\n  x : INT;\nEND_VAR\n  x := 1;\n  f := x;\nEND_FUNCTION\nPROGRAM p\nVAR\n  a : INT;\nEND_VAR\n  a := f(x := 3);\nEND_PROGRAM\n"
+        right "FUNCTION f : INT\nVAR_IN_OUT\n  x : INT;\nEND_VAR\n  x := 1;\n  f := x;\nEND_FUNCTION\nPROGRAM p\nVAR\n  a : INT;\n  b : INT;\nEND_VAR\n  a := f(x := b);\nEND_PROGRAM\n"
     }
     NOT_WRITABLE = "S0016" Error "this can not be written" {
         "CONSTANT variables, inputs of the process image (%I), system variables, and outputs of a function block from outside are only read."

@@ -4,7 +4,7 @@ use super::{AccessSize, DirectAddress, ExprId, Ident};
 use crate::source::Span;
 
 /// An expression.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Expr {
     /// Its number.
     pub id: ExprId,
@@ -15,7 +15,7 @@ pub struct Expr {
 }
 
 /// The forms of an expression.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub enum ExprKind {
     /// A literal.
     Literal(Literal),
@@ -92,7 +92,7 @@ pub enum ExprKind {
 }
 
 /// An argument of a call.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Arg {
     /// What it is.
     pub kind: ArgKind,
@@ -101,7 +101,7 @@ pub struct Arg {
 }
 
 /// The forms of an argument.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub enum ArgKind {
     /// `value`.
     Positional(Expr),

@@ -4,7 +4,7 @@ use super::{Expr, Range};
 use crate::source::Span;
 
 /// A list of statements.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Block {
     /// The statements in order.
     pub statements: Vec<Stmt>,
@@ -13,7 +13,7 @@ pub struct Block {
 }
 
 /// A statement.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Stmt {
     /// What it is.
     pub kind: StmtKind,
@@ -22,7 +22,7 @@ pub struct Stmt {
 }
 
 /// The forms of a statement.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub enum StmtKind {
     /// `target := value`.
     Assign {
@@ -97,7 +97,7 @@ pub enum StmtKind {
 }
 
 /// A condition and what it guards.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct IfBranch {
     /// The condition.
     pub condition: Expr,
@@ -106,7 +106,7 @@ pub struct IfBranch {
 }
 
 /// `1, 3..5, Red: statements`.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct CaseArm {
     /// What selects the arm, at least one.
     pub labels: Vec<CaseLabel>,
@@ -117,7 +117,7 @@ pub struct CaseArm {
 }
 
 /// A label of a CASE arm.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub enum CaseLabel {
     /// One value.
     Value(Expr),

@@ -4,7 +4,7 @@ use super::{Attribute, Expr, Ident, VarDecl};
 use crate::source::Span;
 
 /// `name : specification := initial value` in a TYPE block (IEC 61131-3 table 11).
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct TypeDecl {
     /// The new type's name.
     pub name: Ident,
@@ -19,7 +19,7 @@ pub struct TypeDecl {
 }
 
 /// A type as it is written in a declaration.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct TypeSpec {
     /// What it is.
     pub kind: TypeSpecKind,
@@ -28,7 +28,7 @@ pub struct TypeSpec {
 }
 
 /// The forms of a type.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub enum TypeSpecKind {
     /// `INT`, `Motor`, `TON`: an elementary, derived or function block type, by name.
     Named(Ident),
@@ -90,7 +90,7 @@ pub enum ReferenceKind {
 }
 
 /// `low..high`.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Range {
     /// Lowest value.
     pub low: Expr,
@@ -101,7 +101,7 @@ pub struct Range {
 }
 
 /// A dimension of an array type.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub enum ArrayDim {
     /// `low..high`.
     Range(Range),
@@ -110,7 +110,7 @@ pub enum ArrayDim {
 }
 
 /// One value of an enumeration.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct EnumValue {
     /// Its name.
     pub name: Ident,
@@ -121,7 +121,7 @@ pub struct EnumValue {
 }
 
 /// An initial value.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Init {
     /// What it is.
     pub kind: InitKind,
@@ -130,7 +130,7 @@ pub struct Init {
 }
 
 /// The forms of an initial value.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub enum InitKind {
     /// A constant expression.
     Expr(Expr),
@@ -141,7 +141,7 @@ pub enum InitKind {
 }
 
 /// An entry of an array initialiser.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct InitElement {
     /// `n(…)`: how often the values follow one another. Only a literal counts as one here: `N(0)` with a named constant
     /// is one value, a call expression, for the checker to tell apart.
@@ -153,7 +153,7 @@ pub struct InitElement {
 }
 
 /// `name := value` in a structure initialiser.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct InitField {
     /// The field.
     pub name: Ident,

@@ -4,7 +4,7 @@ use super::{Attribute, Block, Ident, Init, TypeSpec};
 use crate::source::Span;
 
 /// A program, function or function block.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Pou {
     /// Which of them.
     pub kind: PouKind,
@@ -34,7 +34,7 @@ pub enum PouKind {
 }
 
 /// `VAR… qualifiers declarations END_VAR`.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct VarSection {
     /// Which section.
     pub kind: VarKind,
@@ -81,7 +81,7 @@ pub enum Retention {
 }
 
 /// `a, b AT %QX0.0 : BOOL := TRUE;`
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct VarDecl {
     /// The declared names, at least one.
     pub names: Vec<Ident>,

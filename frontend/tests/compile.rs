@@ -1,0 +1,103 @@
+//! Whole compilations: workloads, examples of every rule, and what containers hold, checked by the verifier.
+
+use khz_bytecode::verify::verify;
+use khz_frontend::diagnostics::{Severity, has_errors, semantic, types};
+use khz_frontend::{Compilation, CompileOptions, SourceInput, check, compile};
+
+fn source(name: &str, text: &str) -> SourceInput {
+    SourceInput { name: name.to_owned(), bytes: text.as_bytes().to_vec() }
+}
+
+fn compiled(text: &str) -> Compilation {
+    compile(&[source("test.st", text)], &CompileOptions::default())
+}
+
+fn messages(found: &Compilation) -> String {
+    let lines = found.diagnostics.iter().map(|one| format!("{} {} {}", found.sources.place(one.span), one.code(), one.message));
+    lines.collect::<Vec<_>>().join("\n")
+}
+
+/// Compiles, verifies, and gives the containers.
+fn verified(text: &str) -> Vec<khz_bytecode::container::Container> {
+    let found = compiled(text);
+    assert!(!has_errors(&found.diagnostics), "{}\n{text}", messages(&found));
+    let mut list = Vec::new();
+    for resource in found.resources {
+        if let Err(error) = verify(resource.container.clone()) {
+            panic!("{error}\n{text}");
+        }
+        list.push(resource.container);
+    }
+    list
+}
+
+#[test]
+fn every_rule_is_broken_by_its_wrong_example_and_kept_by_its_right_one() {
+    for rule in semantic::TABLE.iter().chain(types::TABLE).filter(|rule| !rule.wrong.is_empty()) {
+        let wrong = compiled(rule.wrong);
+        let codes: Vec<&str> = wrong.diagnostics.iter().map(|found| found.code()).collect();
+        assert!(codes.contains(&rule.code), "{}: {codes:?}\n{}", rule.code, messages(&wrong));
+        let others = wrong.diagnostics.iter().filter(|found| found.is_error() && found.code() != rule.code);
+        assert_eq!(others.count(), 0, "{}: a cascade\n{}", rule.code, messages(&wrong));
+        assert_eq!(wrong.resources.is_empty(), rule.severity == Severity::Error, "{}", rule.code);
+        let right = compiled(rule.right);
+        let again = right.diagnostics.iter().any(|found| found.code() == rule.code);
+        assert!(!again && !has_errors(&right.diagnostics), "{}: right example\n{}", rule.code, messages(&right));
+        verified(rule.right);
+    }
+}
+
+#[test]
+fn every_standard_block_compiles_and_verifies() {
+    for block in khz_machine::library::blocks::all() {
+        let text = format!("PROGRAM p\nVAR\n  x : {0};\n  y : ARRAY[0..3] OF {0};\n  i : INT;\nEND_VAR\n  x();\n  y[i]();\nEND_PROGRAM\n", block.name);
+        verified(&text);
+    }
+}
+
+#[test]
+fn check_makes_no_containers() {
+    let found = check(&[source("a.st", "PROGRAM p\nEND_PROGRAM\n")], &CompileOptions::default());
+    assert!(found.resources.is_empty() && found.diagnostics.is_empty());
+}
+
+#[test]
+fn the_same_source_gives_the_same_container() {
+    let text = include_str!("programs/tour.st");
+    assert_eq!(compiled(text).resources[0].container, compiled(text).resources[0].container);
+}
+
+#[test]
+fn a_tour_of_the_language_verifies() {
+    verified(include_str!("programs/tour.st"));
+}
+
+#[test]
+fn workloads_verify() {
+    let folder = std::path::Path::new("/work/shared/workloads");
+    let Ok(entries) = std::fs::read_dir(folder) else { return };
+    for entry in entries.flatten().filter(|entry| entry.path().extension().is_some_and(|ext| ext == "st")) {
+        let text = std::fs::read_to_string(entry.path()).expect("a workload is text");
+        let found = compiled(&text);
+        assert!(found.diagnostics.is_empty(), "{}: {}", entry.path().display(), messages(&found));
+        verified(&text);
+    }
+}
+
+#[test]
+fn no_unreachable_code_is_emitted() {
+    for body in [
+        "WHILE TRUE DO a := a + 1; END_WHILE;",
+        "FOR i := 1 TO 9 DO EXIT; END_FOR;",
+        "FOR i := 1 TO 9 DO IF b THEN CONTINUE; ELSE EXIT; END_IF; END_FOR; a := 1;",
+        "REPEAT RETURN; UNTIL b END_REPEAT;",
+        "REPEAT REPEAT a := a + 1; UNTIL b END_REPEAT; UNTIL b END_REPEAT;",
+        "FOR i := 1 TO 9 DO WHILE b DO a := a + 1; END_WHILE; END_FOR;",
+        "IF TRUE THEN RETURN; END_IF; a := 1;",
+        "WHILE b AND_THEN a > 1 OR_ELSE i < 3 DO IF b THEN EXIT; END_IF; CONTINUE; END_WHILE;",
+        "CASE a OF 1: RETURN; 2: EXIT; ELSE RETURN; END_CASE;",
+    ] {
+        let body = body.replace("2: EXIT;", "2: ;");
+        verified(&format!("PROGRAM p\nVAR\n  a : INT;\n  i : INT;\n  b : BOOL;\nEND_VAR\n  {body}\nEND_PROGRAM\n"));
+    }
+}
