@@ -6,9 +6,10 @@ use std::collections::BTreeMap;
 use khz_bytecode::instruction::NumericOp;
 use khz_bytecode::value::{IntegerType, ValueType};
 
-use super::ranges::Ranges;
+use super::ranges::{MOST_LEVELS, Ranges};
 use crate::mir::{
-    BlockData, Const, Control, Counted, ForTest, Function, Instruction, LoopId, Op, Place, Results, Type, Value, Var,
+    Block, BlockData, Const, Control, Counted, ForTest, Function, Instruction, LoopId, Op, Place, Results, Type, Value,
+    Var,
 };
 
 /// Runs it.
@@ -146,21 +147,42 @@ fn stays_narrow(test: &ForTest, step: i64, ranges: &Ranges) -> bool {
 
 /// Gives each loop an i64 that runs beside its control variable, and takes it wherever the control variable would be extended.
 fn widen(function: &mut Function, loops: &[(LoopId, Counted, Var, i64)]) {
-    let mut shadows: BTreeMap<Var, Vec<(LoopId, Var)>> = BTreeMap::new();
+    let mut ways: BTreeMap<Block, Vec<usize>> = BTreeMap::new();
+    for (id, ..) in loops {
+        ways.insert(function.loops[id.index()].header, Vec::new());
+    }
+    for (number, block) in function.blocks.iter().enumerate() {
+        for target in block.terminator.targets() {
+            if let Some(ways) = ways.get_mut(&target.block) {
+                ways.push(number);
+            }
+        }
+    }
+    let mut shadows: Shadows = BTreeMap::new();
     for (id, counted, var, step) in loops {
         let shadow = function.new_variable(Type::I64);
-        if carry(function, *id, counted, *var, *step, shadow) {
-            shadows.entry(*var).or_default().push((*id, shadow));
+        let ways = ways.remove(&function.loops[id.index()].header).unwrap_or_default();
+        if carry(function, *id, counted, (*var, shadow), *step, ways) {
+            shadows.insert(*id, (*var, shadow));
         }
     }
     take_shadows(function, &shadows);
 }
 
-/// Sets the shadow before the loop, moves it on in the latch, and derives the control variable from it in the header.
-fn carry(function: &mut Function, id: LoopId, counted: &Counted, var: Var, step: i64, shadow: Var) -> bool {
+/// Control variable and shadow of each loop that has one.
+type Shadows = BTreeMap<LoopId, (Var, Var)>;
+
+/// Sets the shadow before the loop, moves it on in the latch, and derives the control variable from it in the header. `ways`: the blocks that
+/// lead to the header.
+fn carry(
+    function: &mut Function,
+    id: LoopId,
+    counted: &Counted,
+    (var, shadow): (Var, Var),
+    step: i64,
+    ways: Vec<usize>,
+) -> bool {
     let header = function.loops[id.index()].header;
-    let goes_there = |data: &BlockData| data.terminator.targets().iter().any(|target| target.block == header);
-    let ways: Vec<usize> = (0..function.blocks.len()).filter(|n| goes_there(&function.blocks[*n])).collect();
     let (inside, outside): (Vec<usize>, Vec<usize>) =
         ways.into_iter().partition(|number| function.loop_contains(id, function.blocks[*number].innermost_loop));
     let [latch] = inside[..] else { return false };
@@ -209,8 +231,15 @@ fn insert(function: &mut Function, block: usize, at: usize, place: Place, f: imp
     out.extend(rest);
 }
 
+/// The shadow of a variable in the innermost loop around that counts in it.
+fn shadow_of(function: &Function, shadows: &Shadows, innermost: Option<LoopId>, var: Var) -> Option<(LoopId, Var)> {
+    let around = std::iter::successors(innermost, |id| function.loops[id.index()].parent).take(MOST_LEVELS);
+    let mut shadows = around.filter_map(|id| shadows.get(&id).map(|(control, shadow)| (id, *control, *shadow)));
+    shadows.find(|(_, control, _)| *control == var).map(|(id, _, shadow)| (id, shadow))
+}
+
 /// Extensions of a control variable that was read in its loop become reads of the shadow.
-fn take_shadows(function: &mut Function, shadows: &BTreeMap<Var, Vec<(LoopId, Var)>>) {
+fn take_shadows(function: &mut Function, shadows: &Shadows) {
     let mut reads: Vec<Option<(LoopId, Var)>> = vec![None; function.values.len()];
     for number in 0..function.blocks.len() {
         let innermost = function.blocks[number].innermost_loop;
@@ -233,9 +262,7 @@ fn take_shadows(function: &mut Function, shadows: &BTreeMap<Var, Vec<(LoopId, Va
             let Results::One(result) = instruction.results else { continue };
             match instruction.op {
                 Op::Get(var) => {
-                    let around = shadows.get(&var).into_iter().flatten();
-                    let mut around = around.filter(|(id, _)| function.loop_contains(*id, innermost));
-                    reads[result.index()] = around.next_back().copied();
+                    reads[result.index()] = shadow_of(function, shadows, innermost, var);
                 }
                 Op::Numeric(NumericOp::I64Add, [before, _]) => last_sum = Some((result, before)),
                 Op::Numeric(NumericOp::I64ExtendI32S, [narrow, _]) => {

@@ -5,6 +5,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use khz_bytecode::ids::FunctionId;
 use khz_bytecode::instruction::NumericOp;
 use khz_bytecode::value::{SlotPlace, Storage};
 use khz_bytecode::verify::Verified;
@@ -36,7 +37,7 @@ impl<'a> CallEffects<'a> {
 
     fn add(&self, op: &Op, touched: &mut Touched) {
         match op {
-            Op::Call(function, _) => {
+            Op::Call(function, _) if touched.callees.insert(*function) => {
                 let effects = &self.verified.function(*function).effects;
                 let globals = effects.globals_read.iter().chain(&effects.globals_written);
                 touched.slots.extend(globals.map(|index| Slot { place: SlotPlace::Global, index: *index }));
@@ -53,6 +54,7 @@ impl<'a> CallEffects<'a> {
 
 #[derive(Default)]
 struct Touched {
+    callees: BTreeSet<FunctionId>,
     slots: BTreeSet<Slot>,
     all_globals: bool,
 }
@@ -75,10 +77,39 @@ pub fn run(function: &mut Function, effects: CallEffects<'_>) {
     if function.loops.is_empty() {
         return;
     }
+    let headers = function.loops.iter().enumerate().map(|(number, data)| (data.header, LoopId(number as u32)));
+    let headers: BTreeMap<Block, LoopId> = headers.collect();
     for level in 0..DEEPEST_LEVEL {
         let at_level: Vec<(LoopId, Vec<usize>)> = loops_of_level(function, level);
+        if at_level.is_empty() {
+            return;
+        }
+        let mut ways_in = WaysIn::new(function, &headers);
         for (id, blocks) in at_level {
-            promote(function, id, &blocks, effects);
+            promote(function, id, &blocks, effects, &headers, &mut ways_in);
+        }
+    }
+}
+
+/// Which blocks lead to each loop header. May name one that does so no longer.
+struct WaysIn(BTreeMap<Block, Vec<usize>>);
+
+impl WaysIn {
+    fn new(function: &Function, headers: &BTreeMap<Block, LoopId>) -> WaysIn {
+        let mut ways: BTreeMap<Block, Vec<usize>> = BTreeMap::new();
+        for (number, block) in function.blocks.iter().enumerate() {
+            for target in block.terminator.targets() {
+                if headers.contains_key(&target.block) {
+                    ways.entry(target.block).or_default().push(number);
+                }
+            }
+        }
+        WaysIn(ways)
+    }
+
+    fn add(&mut self, to: Block, from: Block) {
+        if let Some(ways) = self.0.get_mut(&to) {
+            ways.push(from.index());
         }
     }
 }
@@ -103,7 +134,14 @@ fn loops_of_level(function: &Function, level: usize) -> Vec<(LoopId, Vec<usize>)
     blocks.into_iter().collect()
 }
 
-fn promote(function: &mut Function, id: LoopId, blocks: &[usize], effects: CallEffects<'_>) {
+fn promote(
+    function: &mut Function,
+    id: LoopId,
+    blocks: &[usize],
+    effects: CallEffects<'_>,
+    headers: &BTreeMap<Block, LoopId>,
+    ways_in: &mut WaysIn,
+) {
     let inside: BTreeSet<usize> = blocks.iter().copied().collect();
     let chosen = choose(function, blocks, effects);
     let ways_out: usize = blocks.iter().map(|number| leaving(function, *number, &inside).len()).sum();
@@ -125,16 +163,16 @@ fn promote(function: &mut Function, id: LoopId, blocks: &[usize], effects: CallE
         .collect();
     rewrite(function, blocks, &held);
     add_write_back(function, blocks, &dirty);
-    enter(function, id, &inside, &held);
-    leave(function, id, blocks, &inside, &dirty);
-    for data in &mut function.loops {
-        if let Some(counted) = &mut data.counted {
+    enter(function, id, &inside, &held, ways_in);
+    leave(function, id, blocks, &inside, &dirty, ways_in);
+    for number in blocks {
+        let Some(inner) = headers.get(&Block(*number as u32)) else { continue };
+        if let Some(counted) = &mut function.loops[inner.index()].counted {
             let var = match counted.control {
                 Control::Slot(slot) => held.get(&slot).map(|(var, _)| *var),
                 _ => None,
             };
-            // A loop elsewhere that counts in the same slot is not inside this one.
-            if let Some(var) = var.filter(|_| inside.contains(&data.header.index())) {
+            if let Some(var) = var {
                 counted.control = Control::Var(var);
             }
         }
@@ -234,7 +272,13 @@ fn add_write_back(function: &mut Function, blocks: &[usize], dirty: &[Dirty]) {
 }
 
 /// A block in front of the loop loads what it holds.
-fn enter(function: &mut Function, id: LoopId, inside: &BTreeSet<usize>, held: &BTreeMap<Slot, (Var, Access)>) {
+fn enter(
+    function: &mut Function,
+    id: LoopId,
+    inside: &BTreeSet<usize>,
+    held: &BTreeMap<Slot, (Var, Access)>,
+    ways_in: &WaysIn,
+) {
     let header = function.loops[id.index()].header;
     let parent = function.loops[id.index()].parent;
     let types: Vec<_> = function.blocks[header.index()].parameters.iter().map(|value| function.ty(*value)).collect();
@@ -251,11 +295,11 @@ fn enter(function: &mut Function, id: LoopId, inside: &BTreeSet<usize>, held: &B
     let terminator = Terminator::Jump(Target { block: header, arguments: parameters.clone() });
     let entrance =
         function.add_block(BlockData { parameters, instructions, terminator, innermost_loop: parent, write_back });
-    for (number, block) in function.blocks.iter_mut().enumerate() {
-        if inside.contains(&number) || Block(number as u32) == entrance {
+    for number in ways_in.0.get(&header).into_iter().flatten() {
+        if inside.contains(number) {
             continue;
         }
-        for target in block.terminator.targets_mut() {
+        for target in function.blocks[*number].terminator.targets_mut() {
             if target.block == header {
                 target.block = entrance;
             }
@@ -283,7 +327,14 @@ fn common_loop(function: &Function, id: LoopId, block: Block) -> Option<LoopId> 
 }
 
 /// Each way out of the loop passes a block that stores what was changed.
-fn leave(function: &mut Function, id: LoopId, blocks: &[usize], inside: &BTreeSet<usize>, dirty: &[Dirty]) {
+fn leave(
+    function: &mut Function,
+    id: LoopId,
+    blocks: &[usize],
+    inside: &BTreeSet<usize>,
+    dirty: &[Dirty],
+    ways_in: &mut WaysIn,
+) {
     if dirty.is_empty() {
         return;
     }
@@ -300,10 +351,12 @@ fn leave(function: &mut Function, id: LoopId, blocks: &[usize], inside: &BTreeSe
                 let store = Op::StoreSlot(one.slot, one.access, value);
                 instructions.push(Instruction { op: store, results: Results::None, place });
             }
+            let behind = target.block;
             let terminator = Terminator::Jump(target);
             let parameters = Vec::new();
             let exit =
                 function.add_block(BlockData { parameters, instructions, terminator, innermost_loop, write_back });
+            ways_in.add(behind, exit);
             let mut targets = function.blocks[*number].terminator.targets_mut();
             *targets[position] = Target { block: exit, arguments: Vec::new() };
         }

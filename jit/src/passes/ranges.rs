@@ -8,6 +8,9 @@ use khz_bytecode::value::{IntegerType, Storage};
 
 use crate::mir::{Block, Const, Control, Counted, Function, LoopId, Op, Results, Type, Value, Var};
 
+/// Loops around a place that are looked at, innermost first: bounds the work for a nest of many levels.
+pub const MOST_LEVELS: usize = 16;
+
 /// All numbers from `low` to `high`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Interval {
@@ -164,15 +167,11 @@ impl<'a> Walk<'a> {
 
     /// The interval of a control variable in one of the counted loops around a block.
     fn control(&self, block: Block, is_it: impl Fn(Control) -> bool) -> Option<Interval> {
-        let mut at: Option<LoopId> = self.function.blocks[block.index()].innermost_loop;
-        while let Some(id) = at {
-            let data = &self.function.loops[id.index()];
-            if let Some(counted) = data.counted.filter(|counted| is_it(counted.control)) {
-                return self.counted(&counted);
-            }
-            at = data.parent;
-        }
-        None
+        let innermost = self.function.blocks[block.index()].innermost_loop;
+        let parent = |id: &LoopId| self.function.loops[id.index()].parent;
+        let around = std::iter::successors(innermost, parent).take(MOST_LEVELS);
+        let mut counted = around.filter_map(|id| self.function.loops[id.index()].counted);
+        counted.find(|counted| is_it(counted.control)).and_then(|counted| self.counted(&counted))
     }
 
     fn counted(&self, counted: &Counted) -> Option<Interval> {
