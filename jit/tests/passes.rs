@@ -128,3 +128,14 @@ fn not_of_a_bool_needs_no_test_unless_a_branch_asks() {
     let form = form(text, only(&["fold", "bools"]));
     assert_eq!((count(&form, "i32.xor"), count(&form, "i32.eqz")), (1, 2), "{form}");
 }
+
+#[test]
+fn a_bound_beyond_the_type_of_the_control_variable_proves_nothing() {
+    // An i8 passes 127, wraps and never reaches 200: the loop is endless, and its index may be anything.
+    let text = SUM.replace("slot i i32", "slot i i8").replace("for k p i i32", "for k p i i8");
+    assert_eq!(count(&form(&text, Passes::ALL), "check.index"), 0);
+    let text = text.replace("const.i32 9", "const.i32 200").replace("0..9", "0..500");
+    let form = form(&text, Passes::ALL);
+    assert_eq!((count(&form, "check.index"), count(&form, "no deadline")), (1, 0), "{form}");
+    assert_eq!(count(&form, "i64.extend_i32_s"), 1, "{form}");
+}

@@ -66,7 +66,7 @@ impl Writer {
         let number = match self.random.next(8) {
             0 => i64::from(i32::MAX),
             1 => i64::from(i32::MIN),
-            2 => -1,
+            2 => [-1, 100, 127, 128, 255, 256, 1000, -129][self.random.next(8) as usize],
             _ => self.random.next(12) as i64 - 2,
         };
         self.line(&format!("const.i32 {number}"));

@@ -57,8 +57,8 @@ fn work_of(function: &Function) -> Vec<Option<u64>> {
 fn passes(counted: &Counted, ranges: &Ranges) -> Option<u64> {
     let number = |value| ranges.constant(value).and_then(Const::as_i64);
     let (initial, bound, step) = (number(counted.initial)?, number(counted.bound)?, number(counted.step)?);
-    // Bit patterns of unsigned types are numbers only where they are not negative.
-    if step == 0 || (!counted.ty.is_signed() && (initial < 0 || bound < 0)) {
+    // Bit patterns of unsigned types are numbers only where they are not negative; beyond its type a bound is never reached.
+    if step == 0 || (!counted.ty.is_signed() && initial < 0) || !ranges.bound_is_in_type(counted) {
         return None;
     }
     let distance = if step > 0 { bound.checked_sub(initial) } else { initial.checked_sub(bound) };

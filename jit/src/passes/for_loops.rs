@@ -24,7 +24,7 @@ pub fn run(function: &mut Function) {
             let Control::Var(var) = counted.control else { return None };
             let carried = matches!(counted.ty, IntegerType::I8 | IntegerType::I16 | IntegerType::I32)
                 || matches!(counted.ty, IntegerType::U8 | IntegerType::U16);
-            carried.then_some((id, counted, var, step))
+            (carried && ranges.bound_is_in_type(&counted)).then_some((id, counted, var, step))
         })
         .collect();
     if !wide.is_empty() {

@@ -97,11 +97,26 @@ impl Ranges {
         self.values[value.index()]
     }
 
+    /// Whether the bound of a loop is a number of the control variable's type for certain: only then the variable never wraps while the loop runs.
+    #[must_use]
+    pub fn bound_is_in_type(&self, counted: &Counted) -> bool {
+        bound_is_in_type(counted, self.of(counted.bound))
+    }
+
     /// The constant that a value is.
     #[must_use]
     pub fn constant(&self, value: Value) -> Option<Const> {
         self.constants[value.index()]
     }
+}
+
+fn bound_is_in_type(counted: &Counted, bound: Interval) -> bool {
+    // Unsigned numbers of full width are bit patterns here; those that are not negative are in the type.
+    let own = match counted.ty {
+        IntegerType::U32 | IntegerType::U64 => Interval { low: 0, high: i64::MAX },
+        ty => Interval::of_storage(ty.storage()),
+    };
+    bound.is_inside(own)
 }
 
 struct Walk<'a> {
@@ -174,6 +189,11 @@ impl<'a> Walk<'a> {
         counted.find(|counted| is_it(counted.control)).and_then(|counted| self.counted(&counted))
     }
 
+    /// Whether the bound is a number of the control variable's type. Beyond it the variable wraps and the loop goes on.
+    fn bound_is_in_type(&self, counted: &Counted) -> bool {
+        bound_is_in_type(counted, self.values[counted.bound.index()])
+    }
+
     fn counted(&self, counted: &Counted) -> Option<Interval> {
         let of = |value: Value| self.values[value.index()];
         let (initial, bound, step) = (of(counted.initial), of(counted.bound), of(counted.step));
@@ -182,8 +202,9 @@ impl<'a> Walk<'a> {
             IntegerType::U32 | IntegerType::U64 => return None,
             ty => Interval::of_storage(ty.storage()),
         };
-        // Compared as unsigned numbers, a negative bound is larger than any control variable.
-        let bound = if counted.ty.is_signed() || bound.low >= 0 { bound } else { own };
+        if !self.bound_is_in_type(counted) {
+            return None;
+        }
         let (low, high) = if step.low > 0 {
             (initial.low, bound.high)
         } else if step.high < 0 {
