@@ -95,7 +95,7 @@ fn run(inputs: &[SourceInput], options: &CompileOptions, lowers: bool) -> Compil
     let standard = add_standard_blocks(&mut sources);
     let (ast, found) = parse(&sources);
     diagnostics.extend(found);
-    let (project, found) = analysis::analyze(&ast, &sources, options.dialect, standard);
+    let (project, found) = analysis::analyze(&ast, options.dialect, standard);
     diagnostics.extend(found);
     let mut resources = Vec::new();
     if lowers && !has_errors(&diagnostics) {
@@ -133,6 +133,7 @@ fn add_standard_blocks(sources: &mut SourceMap) -> Option<FileId> {
     if used.is_empty() {
         return None;
     }
-    let text: String = known.iter().filter(|block| used.contains(&block.name)).map(|block| block.source.as_str()).collect();
+    let text: String =
+        known.iter().filter(|block| used.contains(&block.name)).map(|block| block.source.as_str()).collect();
     Some(sources.add_text(STANDARD_FILE, text))
 }

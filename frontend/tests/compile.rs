@@ -13,7 +13,8 @@ fn compiled(text: &str) -> Compilation {
 }
 
 fn messages(found: &Compilation) -> String {
-    let lines = found.diagnostics.iter().map(|one| format!("{} {} {}", found.sources.place(one.span), one.code(), one.message));
+    let lines =
+        found.diagnostics.iter().map(|one| format!("{} {} {}", found.sources.place(one.span), one.code(), one.message));
     lines.collect::<Vec<_>>().join("\n")
 }
 
@@ -35,7 +36,7 @@ fn verified(text: &str) -> Vec<khz_bytecode::container::Container> {
 fn every_rule_is_broken_by_its_wrong_example_and_kept_by_its_right_one() {
     for rule in semantic::TABLE.iter().chain(types::TABLE).filter(|rule| !rule.wrong.is_empty()) {
         let wrong = compiled(rule.wrong);
-        let codes: Vec<&str> = wrong.diagnostics.iter().map(|found| found.code()).collect();
+        let codes: Vec<&str> = wrong.diagnostics.iter().map(khz_frontend::diagnostics::Diagnostic::code).collect();
         assert!(codes.contains(&rule.code), "{}: {codes:?}\n{}", rule.code, messages(&wrong));
         let others = wrong.diagnostics.iter().filter(|found| found.is_error() && found.code() != rule.code);
         assert_eq!(others.count(), 0, "{}: a cascade\n{}", rule.code, messages(&wrong));
@@ -50,7 +51,10 @@ fn every_rule_is_broken_by_its_wrong_example_and_kept_by_its_right_one() {
 #[test]
 fn every_standard_block_compiles_and_verifies() {
     for block in khz_machine::library::blocks::all() {
-        let text = format!("PROGRAM p\nVAR\n  x : {0};\n  y : ARRAY[0..3] OF {0};\n  i : INT;\nEND_VAR\n  x();\n  y[i]();\nEND_PROGRAM\n", block.name);
+        let text = format!(
+            "PROGRAM p\nVAR\n  x : {0};\n  y : ARRAY[0..3] OF {0};\n  i : INT;\nEND_VAR\n  x();\n  y[i]();\nEND_PROGRAM\n",
+            block.name
+        );
         verified(&text);
     }
 }

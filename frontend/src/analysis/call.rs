@@ -4,7 +4,9 @@ use std::rc::Rc;
 
 use super::expr::{Checker, broken};
 use super::place::step;
-use super::tree::{Call, Expr, ExprKind, Place, PouId, PouInfo, Root, Step, Stmt, StmtKind, UnOp, VarClass, VarId, VarInfo};
+use super::tree::{
+    Call, Expr, ExprKind, Place, PouId, PouInfo, Root, Step, Stmt, StmtKind, UnOp, VarClass, VarId, VarInfo,
+};
 use super::types::{BOOL, Const, Ty, TyId, Value};
 use crate::diagnostics::{semantic as names, types as rules};
 use crate::source::Span;
@@ -59,7 +61,8 @@ impl<'a> Checker<'_, 'a> {
                 Some(PouKind::Function) => Callee::Function(pou),
                 kind => {
                     let what = if kind == Some(PouKind::Program) { "a program" } else { "a type" };
-                    let message = format!("`{}` is {what}, not a function; only instances of it run", self.an.spelling(name));
+                    let message =
+                        format!("`{}` is {what}, not a function; only instances of it run", self.an.spelling(name));
                     self.an.report(&names::NOT_CALLABLE, name.span, message);
                     Callee::Broken
                 }
@@ -83,7 +86,11 @@ impl<'a> Checker<'_, 'a> {
             }
             Callee::Function(pou) => {
                 if self.is_constant_context() {
-                    self.an.report(&names::NOT_CONSTANT, span, "functions are not computed when the program is compiled");
+                    self.an.report(
+                        &names::NOT_CONSTANT,
+                        span,
+                        "functions are not computed when the program is compiled",
+                    );
                     return broken(span);
                 }
                 let Some(call) = self.function_call(pou, args, span) else { return broken(span) };
@@ -99,7 +106,8 @@ impl<'a> Checker<'_, 'a> {
 
     fn result_type(&self, pou: PouId) -> Ty {
         let info = self.an.info(pou);
-        info.and_then(|info| info.result.and_then(|var| info.vars.get(var.0 as usize).map(|var| var.ty))).unwrap_or(Ty::Void)
+        info.and_then(|info| info.result.and_then(|var| info.vars.get(var.0 as usize).map(|var| var.ty)))
+            .unwrap_or(Ty::Void)
     }
 
     /// A call as a statement.
@@ -249,7 +257,12 @@ impl<'a> Checker<'_, 'a> {
                 _ => {}
             }
         }
-        let after = self.outputs(&bound, &info, |id, var| Place { root: Root::CallOutput(id), path: Vec::new(), ty: var.ty, span });
+        let after = self.outputs(&bound, &info, |id, var| Place {
+            root: Root::CallOutput(id),
+            path: Vec::new(),
+            ty: var.ty,
+            span,
+        });
         let eno = bound.eno.and_then(|(eno, _)| self.eno(eno));
         sound.then(|| Call { target: pou, instance: None, en, eno, inputs, before: Vec::new(), inouts, after, span })
     }
@@ -318,7 +331,8 @@ impl<'a> Checker<'_, 'a> {
         }
         if place.ty != var.ty && var.ty != Ty::Error {
             let (wanted, found) = (self.an.types.name(var.ty), self.an.types.name(place.ty));
-            let message = format!("`{}` is a VAR_IN_OUT of {wanted}; a variable of {found} can not stand in for it", var.name);
+            let message =
+                format!("`{}` is a VAR_IN_OUT of {wanted}; a variable of {found} can not stand in for it", var.name);
             self.an.report(&rules::MISMATCH, given.span, message);
             return None;
         }

@@ -1,15 +1,18 @@
 //! Configurations: resources, program instances and their connections (IEC 61131-3 6.8).
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 
+use super::Analyzer;
 use super::expr::{Checker, Environment};
 use super::tree::{
-    Expr, ExprKind, GlobalId, InstancePlan, Place, PouId, ResourcePlan, Root, SinglePlan, Stmt, TaskPlan, Usage, VarClass, VarId,
+    Expr, ExprKind, GlobalId, InstancePlan, Place, PouId, ResourcePlan, Root, SinglePlan, Stmt, TaskPlan, Usage,
+    VarClass, VarId,
 };
-use super::Analyzer;
 use crate::diagnostics::{Diagnostic, semantic as rules};
 use crate::source::Span;
-use crate::syntax::ast::{Configuration, Connection, Declaration, ExprKind as AstKind, Ident, PouKind, ProgramInstance, Resource};
+use crate::syntax::ast::{
+    Configuration, Connection, Declaration, ExprKind as AstKind, Ident, PouKind, ProgramInstance, Resource,
+};
 use crate::syntax::symbol::Symbol;
 
 /// Priority of the task of programs without one: the lowest.
@@ -35,13 +38,13 @@ impl<'a> Analyzer<'a> {
             let Declaration::Configuration(found) = declaration else { continue };
             any = true;
             self.refuse_config_sections(found);
-            let mut names: HashMap<Symbol, Span> = HashMap::new();
+            let mut names: BTreeMap<Symbol, Span> = BTreeMap::new();
             for declared in &found.resources {
-                if let Some(name) = &declared.name {
-                    if let Some(first) = names.insert(name.symbol, name.span) {
-                        let message = format!("there are two resources `{}`", self.spelling(name));
-                        self.push(Diagnostic::new(&rules::DUPLICATE_NAME, name.span, message).label(first, "first here"));
-                    }
+                if let Some(name) = &declared.name
+                    && let Some(first) = names.insert(name.symbol, name.span)
+                {
+                    let message = format!("there are two resources `{}`", self.spelling(name));
+                    self.push(Diagnostic::new(&rules::DUPLICATE_NAME, name.span, message).label(first, "first here"));
                 }
                 planned.push(self.resource(found, declared, configuration, resource, startup));
                 resource += 1;
@@ -72,7 +75,10 @@ impl<'a> Analyzer<'a> {
             let info = self.info(id);
             let plain = info.is_some_and(|info| {
                 info.kind == PouKind::Function
-                    && !info.vars.iter().any(|var| matches!(var.class, VarClass::Input | VarClass::InOut | VarClass::Output))
+                    && !info
+                        .vars
+                        .iter()
+                        .any(|var| matches!(var.class, VarClass::Input | VarClass::InOut | VarClass::Output))
             });
             if !plain {
                 self.report(&rules::STARTUP, attribute.span, "only a FUNCTION without parameters can run at the start");
@@ -133,7 +139,7 @@ impl<'a> Analyzer<'a> {
 
     /// The globals that a resource sees: an inner name hides an outer one.
     pub(super) fn environment(&self, configuration: Option<u32>, resource: Option<u32>) -> Environment {
-        let mut seen: HashMap<Symbol, (u8, GlobalId)> = HashMap::new();
+        let mut seen: BTreeMap<Symbol, (u8, GlobalId)> = BTreeMap::new();
         for (at, global) in (0u32..).zip(&self.globals) {
             let rank = match (global.configuration, global.resource) {
                 (None, _) => 0,
@@ -180,12 +186,15 @@ impl<'a> Analyzer<'a> {
             let found = self.task(task);
             plan.tasks.push(found);
         }
-        let mut names: HashMap<Symbol, Span> = HashMap::new();
+        let mut names: BTreeMap<Symbol, Span> = BTreeMap::new();
         let mut symbols: Vec<Symbol> = Vec::new();
         for program in &declared.programs {
             if let Some(first) = names.insert(program.name.symbol, program.name.span) {
-                let message = format!("there are two program instances `{}` in this resource", self.spelling(&program.name));
-                self.push(Diagnostic::new(&rules::DUPLICATE_NAME, program.name.span, message).label(first, "first here"));
+                let message =
+                    format!("there are two program instances `{}` in this resource", self.spelling(&program.name));
+                self.push(
+                    Diagnostic::new(&rules::DUPLICATE_NAME, program.name.span, message).label(first, "first here"),
+                );
                 continue;
             }
             if let Some(instance) = self.instance(program, &task_names, &environment, &mut plan) {
@@ -248,7 +257,8 @@ impl<'a> Analyzer<'a> {
         if let Some(id) = found.filter(is_program) {
             return Some(id);
         }
-        let known: Vec<Symbol> = self.pou_decls.iter().filter(|pou| pou.kind == PouKind::Program).map(|pou| pou.name.symbol).collect();
+        let known: Vec<Symbol> =
+            self.pou_decls.iter().filter(|pou| pou.kind == PouKind::Program).map(|pou| pou.name.symbol).collect();
         let message = format!("there is no program `{}`", self.spelling(name));
         self.report_unknown(&rules::UNKNOWN_PROGRAM, name, message, known.into_iter());
         None
@@ -277,7 +287,11 @@ impl<'a> Analyzer<'a> {
             Connection::Source { variable, source } => (variable, source, true),
             Connection::Sink { variable, sink } => (variable, sink, false),
             Connection::FbTask { fb, .. } => {
-                self.report(&rules::NOT_SUPPORTED, fb.span, "function block instances on tasks of their own are not of the language yet");
+                self.report(
+                    &rules::NOT_SUPPORTED,
+                    fb.span,
+                    "function block instances on tasks of their own are not of the language yet",
+                );
                 return;
             }
         };
@@ -333,7 +347,9 @@ impl<'a> Analyzer<'a> {
 
 /// The task of programs without one: made when the first is met, always the last.
 fn freewheeling(plan: &mut ResourcePlan) -> u32 {
-    let is_it = |task: &TaskPlan| task.name == "freewheeling" && task.priority == FREEWHEELING_PRIORITY && task.interval_us.is_none();
+    let is_it = |task: &TaskPlan| {
+        task.name == "freewheeling" && task.priority == FREEWHEELING_PRIORITY && task.interval_us.is_none()
+    };
     if !plan.tasks.last().is_some_and(is_it) {
         plan.tasks.push(TaskPlan {
             name: "freewheeling".to_owned(),

@@ -33,7 +33,11 @@ pub(super) fn implicit(from: E, to: E) -> Way {
         (E::Lreal, E::Real) => Way::Vendor(&rules::REAL_NARROWED),
         _ if from == E::Bool && is_bits(to) => Way::Standard,
         _ if is_bits(from) && is_bits(to) => {
-            if bits(from) < bits(to) { Way::Standard } else { Way::Vendor(&rules::NARROWED) }
+            if bits(from) < bits(to) {
+                Way::Standard
+            } else {
+                Way::Vendor(&rules::NARROWED)
+            }
         }
         _ if is_integer(from) && is_integer(to) => {
             let ((low, high), (least, most)) = (limits(from).unwrap_or((0, 0)), limits(to).unwrap_or((0, 0)));
@@ -124,10 +128,10 @@ impl Checker<'_, '_> {
         let span = expr.span;
         if let Some(TyKind::Subrange { base, low, high }) = self.an.types.kind(to).cloned() {
             let inner = self.coerce(expr, Ty::Elem(base));
-            return self.into_range(inner, to, base, (low, high));
+            return self.ranged(inner, to, base, (low, high));
         }
         match (expr.ty, to) {
-            (Ty::IntLit | Ty::RealLit, Ty::Elem(elementary)) => return self.literal(expr, elementary),
+            (Ty::IntLit | Ty::RealLit, Ty::Elem(elementary)) => return self.literal(&expr, elementary),
             (Ty::Str(_), Ty::Str(_)) => return expr,
             _ => {}
         }
@@ -194,10 +198,10 @@ impl Checker<'_, '_> {
     pub(super) fn convert(&mut self, expr: Expr, to: E, truncates: bool) -> Expr {
         let (span, ty) = (expr.span, Ty::Elem(to));
         let from = self.an.types.elementary(expr.ty);
-        if let (Some(from), ExprKind::Const(value)) = (from, &expr.kind) {
-            if let Some(value) = fold::convert(value, from, to, truncates) {
-                return Expr { kind: ExprKind::Const(value), ty, span };
-            }
+        if let (Some(from), ExprKind::Const(value)) = (from, &expr.kind)
+            && let Some(value) = fold::convert(value, from, to, truncates)
+        {
+            return Expr { kind: ExprKind::Const(value), ty, span };
         }
         if from == Some(to) {
             return Expr { ty, ..expr };
@@ -205,7 +209,7 @@ impl Checker<'_, '_> {
         Expr { kind: ExprKind::Convert { value: Box::new(expr), truncates }, ty, span }
     }
 
-    fn into_range(&mut self, expr: Expr, to: Ty, base: E, (low, high): (i64, i64)) -> Expr {
+    fn ranged(&mut self, expr: Expr, to: Ty, base: E, (low, high): (i64, i64)) -> Expr {
         let span = expr.span;
         if expr.ty == Ty::Error {
             return expr;
@@ -223,7 +227,7 @@ impl Checker<'_, '_> {
     }
 
     /// A literal as a value of an elementary type.
-    pub(super) fn literal(&mut self, expr: Expr, to: E) -> Expr {
+    pub(super) fn literal(&mut self, expr: &Expr, to: E) -> Expr {
         let span = expr.span;
         let fail = Expr { kind: ExprKind::Const(Const::Int(0)), ty: Ty::Error, span };
         let value = match &expr.kind {
@@ -243,10 +247,14 @@ impl Checker<'_, '_> {
             }
             ExprKind::Const(Const::Wide(value @ (0 | 1))) if to == E::Bool => Const::Int(i64::from(*value == 1)),
             ExprKind::Const(Const::Lit(wide, narrow)) if is_real(to) => {
-                if to == E::Real { Const::F32(fold::canonical32(*narrow)) } else { Const::F64(fold::canonical64(*wide)) }
+                if to == E::Real {
+                    Const::F32(fold::canonical32(*narrow))
+                } else {
+                    Const::F64(fold::canonical64(*wide))
+                }
             }
             ExprKind::Const(_) => {
-                self.mismatch(&expr, Ty::Elem(to));
+                self.mismatch(expr, Ty::Elem(to));
                 return fail;
             }
             // Operations on literals are folded, so that a literal type is always a constant.
@@ -274,9 +282,9 @@ impl Checker<'_, '_> {
                     Some(to) if is_integer(to) || is_bits(to) || is_real(to) => to,
                     _ => Self::literal_type(*value),
                 };
-                self.literal(expr, to)
+                self.literal(&expr, to)
             }
-            (_, Ty::RealLit) => self.literal(expr, if wanted == Some(E::Real) { E::Real } else { E::Lreal }),
+            (_, Ty::RealLit) => self.literal(&expr, if wanted == Some(E::Real) { E::Real } else { E::Lreal }),
             _ => expr,
         }
     }
@@ -295,9 +303,9 @@ impl Checker<'_, '_> {
         }
         let (a, b) = match (is_literal(a.ty), is_literal(b.ty)) {
             (true, true) => return self.unify_literals(a, b, want),
-            (true, false) => (self.adapt(a, b.ty, want)?, b),
+            (true, false) => (self.adapt(&a, b.ty, want)?, b),
             (false, true) => {
-                let adapted = self.adapt(b, a.ty, want)?;
+                let adapted = self.adapt(&b, a.ty, want)?;
                 (a, adapted)
             }
             (false, false) => (a, b),
@@ -335,7 +343,7 @@ impl Checker<'_, '_> {
     }
 
     /// A literal beside an operand of another type.
-    fn adapt(&mut self, literal: Expr, other: Ty, want: Ty) -> Option<Expr> {
+    fn adapt(&mut self, literal: &Expr, other: Ty, want: Ty) -> Option<Expr> {
         let other = self.an.types.elementary(other)?;
         if let (ExprKind::Const(Const::Wide(value)), true) = (&literal.kind, literal.ty == Ty::IntLit) {
             if is_real(other) {

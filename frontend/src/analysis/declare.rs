@@ -1,6 +1,6 @@
 //! Declarations: which names there are, and what each unit and global variable is.
 
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 use std::rc::Rc;
 
 use khz_bytecode::value::BytePlace;
@@ -11,7 +11,8 @@ use super::{Analyzer, ConstEntry, GlobalDecl, State, TypeEntry, TypeSource};
 use crate::diagnostics::{Diagnostic, semantic as rules};
 use crate::source::Span;
 use crate::syntax::ast::{
-    AccessSize, Area, Declaration, DirectAddress, Ident, Pou, PouKind, Retention, TypeSpecKind, VarDecl, VarKind, VarSection,
+    AccessSize, Area, Declaration, DirectAddress, Ident, Pou, PouKind, Retention, TypeSpecKind, VarDecl, VarKind,
+    VarSection,
 };
 use crate::syntax::symbol::Symbol;
 
@@ -119,7 +120,7 @@ impl<'a> Analyzer<'a> {
         }
         self.pou_decls.push(pou);
         self.pous.push(None);
-        self.scopes.push(HashMap::new());
+        self.scopes.push(BTreeMap::new());
     }
 
     fn declare_constants(&mut self, section: &'a VarSection, scope: Option<PouId>) {
@@ -143,9 +144,10 @@ impl<'a> Analyzer<'a> {
                 let id = GlobalId(u32::try_from(self.global_decls.len()).unwrap_or(u32::MAX));
                 let same = self.global_names.entry(name.symbol).or_default();
                 let decls = &self.global_decls;
-                let clash = same.iter().map(|id| &decls[id.0 as usize]).find(|other| {
-                    (other.configuration, other.resource) == (configuration, resource)
-                });
+                let clash = same
+                    .iter()
+                    .map(|id| &decls[id.0 as usize])
+                    .find(|other| (other.configuration, other.resource) == (configuration, resource));
                 let clash = clash.map(|other| other.name.span);
                 same.push(id);
                 if clash.is_some() {
@@ -238,7 +240,7 @@ impl<'a> Analyzer<'a> {
 
     fn declare_variables(&mut self, id: PouId, pou: &'a Pou) -> PouInfo {
         let mut vars: Vec<VarInfo> = Vec::new();
-        let mut names: HashMap<Symbol, VarId> = HashMap::new();
+        let mut names: BTreeMap<Symbol, VarId> = BTreeMap::new();
         let mut result = None;
         if let Some(spec) = &pou.result {
             let (ty, init) = self.resolve_spec(spec, Some(id));
@@ -260,15 +262,7 @@ impl<'a> Analyzer<'a> {
         if let Some(slot) = self.scopes.get_mut(id.0 as usize) {
             *slot = names;
         }
-        PouInfo {
-            kind: pou.kind,
-            symbol: pou.name.symbol,
-            name: self.spelling(&pou.name).to_owned(),
-            span: pou.name.span,
-            vars,
-            result,
-            block,
-        }
+        PouInfo { kind: pou.kind, name: self.spelling(&pou.name).to_owned(), span: pou.name.span, vars, result, block }
     }
 
     fn var_class(&mut self, section: &VarSection, kind: PouKind) -> VarClass {
@@ -296,7 +290,7 @@ impl<'a> Analyzer<'a> {
         decl: &'a VarDecl,
         class: VarClass,
         vars: &mut Vec<VarInfo>,
-        names: &mut HashMap<Symbol, VarId>,
+        names: &mut BTreeMap<Symbol, VarId>,
     ) {
         let constant = section.constant.is_some();
         if let Some((_, span)) = decl.edge {
@@ -357,7 +351,11 @@ impl<'a> Analyzer<'a> {
     fn located(&mut self, decl: &VarDecl, ty: Ty) -> Option<Located> {
         let address = decl.address.as_ref()?;
         if address.is_incomplete() {
-            self.report(&rules::NOT_SUPPORTED, address.span, "addresses that VAR_CONFIG completes are not of the language yet");
+            self.report(
+                &rules::NOT_SUPPORTED,
+                address.span,
+                "addresses that VAR_CONFIG completes are not of the language yet",
+            );
             return None;
         }
         let located = self.address(address)?;
@@ -365,7 +363,11 @@ impl<'a> Analyzer<'a> {
             return Some(located);
         }
         if self.types.holds_block(ty) {
-            self.report(&rules::BAD_ADDRESS, address.span, "a function block instance has no place in the process image");
+            self.report(
+                &rules::BAD_ADDRESS,
+                address.span,
+                "a function block instance has no place in the process image",
+            );
             return None;
         }
         let bits = if ty == BOOL { 1 } else { u64::from(self.types.extent(ty).0) * 8 };
@@ -377,7 +379,11 @@ impl<'a> Analyzer<'a> {
             return None;
         }
         if matches!(self.types.kind(ty), Some(TyKind::Subrange { .. })) {
-            self.report(&rules::BAD_ADDRESS, address.span, "the image may hold any value, so no subrange can stand there");
+            self.report(
+                &rules::BAD_ADDRESS,
+                address.span,
+                "the image may hold any value, so no subrange can stand there",
+            );
             return None;
         }
         let end = u64::from(located.offset) + bits.div_ceil(8);
@@ -409,7 +415,9 @@ impl<'a> Analyzer<'a> {
             return None;
         };
         match u32::try_from(offset) {
-            Ok(offset) if offset + size.bits().div_ceil(8) <= u32::from(u16::MAX) => Some(Located { place, offset, bit }),
+            Ok(offset) if offset + size.bits().div_ceil(8) <= u32::from(u16::MAX) => {
+                Some(Located { place, offset, bit })
+            }
             _ => {
                 self.report(&rules::BAD_ADDRESS, address.span, format!("byte {offset} is beyond the largest image"));
                 None

@@ -1,6 +1,6 @@
 //! Expressions: from names and operators to typed operations.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 use std::rc::Rc;
 
 use khz_bytecode::container::ElementaryType as E;
@@ -15,7 +15,7 @@ use crate::syntax::ast::{self, Ident, LiteralValue};
 use crate::syntax::symbol::Symbol;
 
 /// Globals that a body sees, by name.
-pub(super) type Environment = HashMap<Symbol, GlobalId>;
+pub(super) type Environment = BTreeMap<Symbol, GlobalId>;
 
 /// Checks expressions and statements of one body, or constant expressions of declarations.
 pub(super) struct Checker<'c, 'a> {
@@ -76,7 +76,11 @@ impl<'c, 'a> Checker<'c, 'a> {
             (_, Ty::Error) => None,
             (ExprKind::Const(value), ty) => Some((ty, value)),
             _ => {
-                self.an.report(&names::NOT_CONSTANT, expr.span, "the value here must be known when the program is compiled");
+                self.an.report(
+                    &names::NOT_CONSTANT,
+                    expr.span,
+                    "the value here must be known when the program is compiled",
+                );
                 None
             }
         }
@@ -131,7 +135,8 @@ impl<'c, 'a> Checker<'c, 'a> {
             }
             LiteralValue::String(text) => {
                 let length = u16::try_from(text.len().max(1)).ok();
-                let Some(length) = length.filter(|length| u32::from(*length) <= khz_bytecode::limits::MAX_STRING_LENGTH)
+                let Some(length) =
+                    length.filter(|length| u32::from(*length) <= khz_bytecode::limits::MAX_STRING_LENGTH)
                 else {
                     self.an.report(&rules::STRING_LENGTH, span, "the text is longer than a STRING may be");
                     return broken(span);
@@ -325,10 +330,10 @@ impl<'c, 'a> Checker<'c, 'a> {
             self.an.report(&rules::OPERATOR, span, message);
             return broken(span);
         }
-        if let (UnOp::Not, Some(ty)) = (kind, elementary) {
-            if is_integer(ty) {
-                self.an.report_vendor(&rules::BIT_ARITHMETIC, span, format!("NOT works on the bits of {}", ty.name()));
-            }
+        if let (UnOp::Not, Some(ty)) = (kind, elementary)
+            && is_integer(ty)
+        {
+            self.an.report_vendor(&rules::BIT_ARITHMETIC, span, format!("NOT works on the bits of {}", ty.name()));
         }
         self.unary_op(kind, found, span)
     }
@@ -340,10 +345,10 @@ impl<'c, 'a> Checker<'c, 'a> {
     /// Builds an operation with one operand, folded when it is known.
     pub(super) fn unary_op(&mut self, op: UnOp, value: Expr, span: Span) -> Expr {
         let ty = self.an.types.without_range(value.ty);
-        if let ExprKind::Const(known) = &value.kind {
-            if let Some(folded) = fold::unary(op, self.an.types.elementary(ty), known) {
-                return Expr { kind: ExprKind::Const(folded), ty, span };
-            }
+        if let ExprKind::Const(known) = &value.kind
+            && let Some(folded) = fold::unary(op, self.an.types.elementary(ty), known)
+        {
+            return Expr { kind: ExprKind::Const(folded), ty, span };
         }
         Expr { kind: ExprKind::Unary(op, Box::new(value)), ty, span }
     }
@@ -354,12 +359,13 @@ impl<'c, 'a> Checker<'c, 'a> {
         let hint = if op.is_comparison() { Ty::Void } else { want };
         let mut a = self.expr(lhs, hint);
         let b = self.expr(rhs, if self.is_enum(a.ty) { a.ty } else { hint });
-        if op.is_comparison() && self.is_enum(b.ty) && b.ty != a.ty {
-            if let ast::ExprKind::Name(_) = lhs.kind {
-                if matches!(a.kind, ExprKind::Const(_)) {
-                    a = self.expr(lhs, b.ty);
-                }
-            }
+        if op.is_comparison()
+            && self.is_enum(b.ty)
+            && b.ty != a.ty
+            && let ast::ExprKind::Name(_) = lhs.kind
+            && matches!(a.kind, ExprKind::Const(_))
+        {
+            a = self.expr(lhs, b.ty);
         }
         self.binary_op(op, a, b, span, want)
     }
@@ -506,16 +512,23 @@ impl<'c, 'a> Checker<'c, 'a> {
         let (x, y) = (a.ty, b.ty);
         let real = |this: &Self, ty| ty == Ty::RealLit || this.an.types.elementary(ty).is_some_and(is_real);
         let number = |this: &Self, ty| {
-            real(this, ty) || ty == Ty::IntLit || this.an.types.elementary(ty).is_some_and(is_integer) && !this.is_enum(ty)
+            real(this, ty)
+                || ty == Ty::IntLit
+                || this.an.types.elementary(ty).is_some_and(is_integer) && !this.is_enum(ty)
         };
         if !number(self, x) || !number(self, y) {
             return self.no_operator(BinOp::Pow, x, y, span);
         }
         let narrow = |this: &Self, ty| this.an.types.elementary(ty) == Some(E::Real);
         let any_lreal = [x, y].iter().any(|ty| self.an.types.elementary(*ty) == Some(E::Lreal));
-        let to = if !any_lreal && (narrow(self, x) || narrow(self, y) || narrow(self, want)) { E::Real } else { E::Lreal };
+        let to =
+            if !any_lreal && (narrow(self, x) || narrow(self, y) || narrow(self, want)) { E::Real } else { E::Lreal };
         let bring = |this: &mut Self, expr: Expr| {
-            if matches!(expr.ty, Ty::IntLit | Ty::RealLit) { this.literal(expr, to) } else { this.convert(expr, to, false) }
+            if matches!(expr.ty, Ty::IntLit | Ty::RealLit) {
+                this.literal(&expr, to)
+            } else {
+                this.convert(expr, to, false)
+            }
         };
         let a = bring(self, a);
         let b = bring(self, b);

@@ -144,7 +144,8 @@ pub(super) fn convert(value: &Const, from: E, to: E, truncates: bool) -> Option<
         Const::Int(value) => {
             let mut number = widen(from, *value);
             if is_duration(from) != is_duration(to) {
-                let (unit_from, unit_to) = (if from == E::Time { NS_PER_MS } else { 1 }, if to == E::Time { NS_PER_MS } else { 1 });
+                let (unit_from, unit_to) =
+                    (if from == E::Time { NS_PER_MS } else { 1 }, if to == E::Time { NS_PER_MS } else { 1 });
                 number = i128::from(wrap(E::Lint, number / i128::from(unit_from) * i128::from(unit_to)));
             }
             if is_real(to) {

@@ -39,7 +39,9 @@ impl<'a> Analyzer<'a> {
                 }
                 Value::Array(runs.into())
             }
-            (InitKind::Struct(values), Some(TyKind::Struct { fields })) => self.record_init(values, &fields, None, scope),
+            (InitKind::Struct(values), Some(TyKind::Struct { fields })) => {
+                self.record_init(values, &fields, None, scope)
+            }
             (InitKind::Struct(values), Some(TyKind::Block { fields, pou })) => {
                 self.record_init(values, &fields, Some(pou), scope)
             }
@@ -153,7 +155,8 @@ impl<'a> Analyzer<'a> {
         let ExprKind::Name(name) = &callee.kind else { return None };
         let [arg] = args.as_slice() else { return None };
         let ArgKind::Positional(inner) = &arg.kind else { return None };
-        let known = self.constants.contains_key(&(scope, name.symbol)) || self.constants.contains_key(&(None, name.symbol));
+        let known =
+            self.constants.contains_key(&(scope, name.symbol)) || self.constants.contains_key(&(None, name.symbol));
         if !known {
             return None;
         }
@@ -197,7 +200,10 @@ impl<'a> Analyzer<'a> {
     fn check_init_access(&mut self, pou: PouId, symbol: Symbol, span: Span) {
         use super::tree::VarClass;
         let Some(info) = self.info(pou) else { return };
-        let hidden = info.vars.iter().any(|var| var.symbol == symbol && !matches!(var.class, VarClass::Input | VarClass::Output));
+        let hidden = info
+            .vars
+            .iter()
+            .any(|var| var.symbol == symbol && !matches!(var.class, VarClass::Input | VarClass::Output));
         if hidden && info.name.starts_with("__") {
             self.report(&rules::HIDDEN_MEMBER, span, "this variable is not for the outside");
         }

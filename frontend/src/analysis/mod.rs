@@ -24,14 +24,14 @@ mod standard;
 mod stmt;
 mod tasks;
 
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 use std::rc::Rc;
 
 use self::tree::{GlobalId, GlobalInfo, PouId, PouInfo, Project};
 use self::types::{Ty, TyId, TypeTable, Value};
 use crate::Dialect;
 use crate::diagnostics::{Diagnostic, Rule, Severity, semantic as rules};
-use crate::source::{FileId, SourceMap, Span};
+use crate::source::{FileId, Span};
 use crate::syntax::ast::{Ast, Ident, Pou, TypeDecl, VarDecl, VarSection};
 use crate::syntax::symbol::Symbol;
 
@@ -40,13 +40,8 @@ const MAX_DEPENDENCE: u32 = 200;
 
 /// Checks a parsed program. `standard` is the file of the standard function blocks. The project is complete only when no
 /// diagnostic is an error.
-pub fn analyze(
-    ast: &Ast,
-    sources: &SourceMap,
-    dialect: Dialect,
-    standard: Option<FileId>,
-) -> (Project, Vec<Diagnostic>) {
-    let mut analyzer = Analyzer::new(ast, sources, dialect, standard);
+pub fn analyze(ast: &Ast, dialect: Dialect, standard: Option<FileId>) -> (Project, Vec<Diagnostic>) {
+    let mut analyzer = Analyzer::new(ast, dialect, standard);
     analyzer.declare();
     let resources = analyzer.configure();
     let resources = analyzer.check_bodies(resources);
@@ -86,24 +81,23 @@ struct ConstEntry<'a> {
 /// State of the whole analysis.
 struct Analyzer<'a> {
     ast: &'a Ast,
-    sources: &'a SourceMap,
     dialect: Dialect,
     standard: Option<FileId>,
     diagnostics: Vec<Diagnostic>,
     types: TypeTable,
-    type_names: HashMap<Symbol, TypeEntry<'a>>,
+    type_names: BTreeMap<Symbol, TypeEntry<'a>>,
     /// Enumeration values of declared types: the types that have one of this name.
-    enum_owners: HashMap<Symbol, Vec<Symbol>>,
+    enum_owners: BTreeMap<Symbol, Vec<Symbol>>,
     /// Enumeration values of types without a name.
-    nameless_enums: HashMap<Symbol, Vec<TyId>>,
+    nameless_enums: BTreeMap<Symbol, Vec<TyId>>,
     pou_decls: Vec<&'a Pou>,
-    pou_names: HashMap<Symbol, PouId>,
+    pou_names: BTreeMap<Symbol, PouId>,
     pous: Vec<Option<Rc<PouInfo>>>,
     /// Names of each unit's variables.
-    scopes: Vec<HashMap<Symbol, tree::VarId>>,
-    constants: HashMap<(Option<PouId>, Symbol), ConstEntry<'a>>,
+    scopes: Vec<BTreeMap<Symbol, tree::VarId>>,
+    constants: BTreeMap<(Option<PouId>, Symbol), ConstEntry<'a>>,
     globals: Vec<GlobalInfo>,
-    global_names: HashMap<Symbol, Vec<GlobalId>>,
+    global_names: BTreeMap<Symbol, Vec<GlobalId>>,
     global_decls: Vec<GlobalDecl<'a>>,
     depth: u32,
 }
@@ -119,24 +113,23 @@ struct GlobalDecl<'a> {
 }
 
 impl<'a> Analyzer<'a> {
-    fn new(ast: &'a Ast, sources: &'a SourceMap, dialect: Dialect, standard: Option<FileId>) -> Self {
+    fn new(ast: &'a Ast, dialect: Dialect, standard: Option<FileId>) -> Self {
         Analyzer {
             ast,
-            sources,
             dialect,
             standard,
             diagnostics: Vec::new(),
             types: <TypeTable as Default>::default(),
-            type_names: HashMap::new(),
-            enum_owners: HashMap::new(),
-            nameless_enums: HashMap::new(),
+            type_names: BTreeMap::new(),
+            enum_owners: BTreeMap::new(),
+            nameless_enums: BTreeMap::new(),
             pou_decls: Vec::new(),
-            pou_names: HashMap::new(),
+            pou_names: BTreeMap::new(),
             pous: Vec::new(),
             scopes: Vec::new(),
-            constants: HashMap::new(),
+            constants: BTreeMap::new(),
             globals: Vec::new(),
-            global_names: HashMap::new(),
+            global_names: BTreeMap::new(),
             global_decls: Vec::new(),
             depth: 0,
         }
@@ -204,10 +197,10 @@ impl<'a> Analyzer<'a> {
         for symbol in known {
             let name = self.text(symbol);
             let limit = (wanted.len() / 3).clamp(1, 3);
-            if let Some(distance) = edit_distance(wanted, name, limit) {
-                if best.is_none_or(|found| (distance, name) < found) {
-                    best = Some((distance, name));
-                }
+            if let Some(distance) = edit_distance(wanted, name, limit)
+                && best.is_none_or(|found| (distance, name) < found)
+            {
+                best = Some((distance, name));
             }
         }
         let mut found = Diagnostic::new(rule, ident.span, message);
@@ -237,5 +230,5 @@ fn edit_distance(a: &str, b: &str, limit: usize) -> Option<usize> {
     row.last().copied().filter(|distance| *distance <= limit)
 }
 
-pub(crate) use init::scalar_bytes;
 pub(crate) use fold::NS_PER_MS;
+pub(crate) use init::scalar_bytes;

@@ -17,12 +17,12 @@ const SYSTEM: [(&str, bool); 2] = [("__SYSTEM_UP_TIME", false), ("__SYSTEM_UP_LT
 impl<'a> Checker<'_, 'a> {
     /// The variable of a name: of the unit, else global, else of the system.
     pub(super) fn find_variable(&self, symbol: Symbol) -> Option<Root> {
-        if let Some(pou) = self.pou {
-            if let Some(&var) = self.an.scopes.get(pou.0 as usize).and_then(|scope| scope.get(&symbol)) {
-                let info = self.info.as_ref()?.vars.get(var.0 as usize)?;
-                if info.class != VarClass::External {
-                    return Some(Root::Var(var));
-                }
+        if let Some(pou) = self.pou
+            && let Some(&var) = self.an.scopes.get(pou.0 as usize).and_then(|scope| scope.get(&symbol))
+        {
+            let info = self.info.as_ref()?.vars.get(var.0 as usize)?;
+            if info.class != VarClass::External {
+                return Some(Root::Var(var));
             }
         }
         if let Some(&global) = self.environment.and_then(|environment| environment.get(&symbol)) {
@@ -159,7 +159,9 @@ impl<'a> Checker<'_, 'a> {
             Root::Var(VarId(var)) => {
                 self.info.as_ref().and_then(|info| info.vars.get(var as usize)).map_or(Ty::Error, |var| var.ty)
             }
-            Root::Global(GlobalId(global)) => self.an.globals.get(global as usize).map_or(Ty::Error, |global| global.ty),
+            Root::Global(GlobalId(global)) => {
+                self.an.globals.get(global as usize).map_or(Ty::Error, |global| global.ty)
+            }
             Root::System(true) => Ty::Elem(E::Ltime),
             Root::System(false) => Ty::Elem(E::Time),
             Root::Direct(_) | Root::CallInstance | Root::CallOutput(_) => Ty::Error,
@@ -204,12 +206,12 @@ impl<'a> Checker<'_, 'a> {
             let class = self.an.info(pou).and_then(|info| {
                 info.vars.iter().find(|var| var.symbol == member.symbol).map(|var| (var.class, info.name.clone()))
             });
-            if let Some((class, name)) = class {
-                if !matches!(class, VarClass::Input | VarClass::Output) {
-                    let message = format!("`{}` is private to {name}", self.an.spelling(member));
-                    self.an.report(&names::HIDDEN_MEMBER, member.span, message);
-                    return None;
-                }
+            if let Some((class, name)) = class
+                && !matches!(class, VarClass::Input | VarClass::Output)
+            {
+                let message = format!("`{}` is private to {name}", self.an.spelling(member));
+                self.an.report(&names::HIDDEN_MEMBER, member.span, message);
+                return None;
             }
         }
         let Some(at) = at else {
@@ -287,7 +289,8 @@ impl<'a> Checker<'_, 'a> {
         let width = elementary.storage().bytes() * 8;
         let first = u64::from(index) * u64::from(size.bits());
         if size.bits() >= width || first + u64::from(size.bits()) > u64::from(width) {
-            let message = format!("{} has {width} bits; part {index} of {} bits is outside", elementary.name(), size.bits());
+            let message =
+                format!("{} has {width} bits; part {index} of {} bits is outside", elementary.name(), size.bits());
             self.an.report(&rules::INDEX, part_span, message);
             return None;
         }
@@ -310,9 +313,11 @@ impl<'a> Checker<'_, 'a> {
     /// Whether a place may be written; reports when it may not.
     pub(super) fn may_write(&mut self, place: &Place) -> bool {
         let refusal = match place.root {
-            Root::Var(VarId(var)) => self.info.as_ref().and_then(|info| info.vars.get(var as usize)).and_then(|var| {
-                var.constant.then(|| (format!("`{}` is CONSTANT", var.name), Some(var.span)))
-            }),
+            Root::Var(VarId(var)) => self
+                .info
+                .as_ref()
+                .and_then(|info| info.vars.get(var as usize))
+                .and_then(|var| var.constant.then(|| (format!("`{}` is CONSTANT", var.name), Some(var.span)))),
             Root::Global(GlobalId(global)) => self.an.globals.get(global as usize).and_then(|global| {
                 global.constant.then(|| (format!("`{}` is CONSTANT", global.name), Some(global.span)))
             }),

@@ -64,7 +64,9 @@ impl<'a> Analyzer<'a> {
     }
 
     fn check_body(&mut self, pou: PouId, environment: &Environment) -> (Body, Usage) {
-        let Some(decl) = self.pou_decls.get(pou.0 as usize).copied() else { return (Body::default(), Usage::default()) };
+        let Some(decl) = self.pou_decls.get(pou.0 as usize).copied() else {
+            return (Body::default(), Usage::default());
+        };
         self.check_externals(pou, environment);
         let mut checker = Checker::body(self, Some(pou), environment);
         let statements = checker.block(&decl.body);
@@ -76,7 +78,8 @@ impl<'a> Analyzer<'a> {
     fn check_externals(&mut self, pou: PouId, environment: &Environment) {
         let Some(info) = self.info(pou) else { return };
         for var in info.vars.iter().filter(|var| var.class == VarClass::External) {
-            let Some(global) = environment.get(&var.symbol).and_then(|id| self.globals.get(id.0 as usize)).cloned() else {
+            let Some(global) = environment.get(&var.symbol).and_then(|id| self.globals.get(id.0 as usize)).cloned()
+            else {
                 let message = format!("there is no global variable `{}`", var.name);
                 self.report(&rules::EXTERNAL, var.span, message);
                 continue;
@@ -103,7 +106,10 @@ impl<'a> Analyzer<'a> {
             let mut way: Vec<(PouId, Vec<(PouId, Span)>)> = Vec::new();
             let mut on_way: BTreeSet<PouId> = BTreeSet::new();
             let next = |pou: PouId| -> Vec<(PouId, Span)> {
-                calls.get(&pou).map(|list| list.iter().rev().map(|(id, span)| (*id, *span)).collect()).unwrap_or_default()
+                calls
+                    .get(&pou)
+                    .map(|list| list.iter().rev().map(|(id, span)| (*id, *span)).collect())
+                    .unwrap_or_default()
             };
             way.push((start, next(start)));
             on_way.insert(start);

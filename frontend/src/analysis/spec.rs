@@ -8,7 +8,8 @@ use khz_bytecode::limits::{MAX_DIMENSIONS, MAX_IMAGE_BYTES, MAX_STRING_LENGTH, M
 use super::expr::Checker;
 use super::tree::PouId;
 use super::types::{
-    Const, DEFAULT_STRING_LENGTH, FieldDef, Ty, TyDef, TyId, TyKind, Value, elementary_by_name, is_integer, limits, widen, wrap,
+    Const, DEFAULT_STRING_LENGTH, FieldDef, Ty, TyDef, TyId, TyKind, Value, elementary_by_name, is_integer, limits,
+    widen, wrap,
 };
 use super::{Analyzer, State, TypeSource};
 use crate::diagnostics::{semantic as rules, types as type_rules};
@@ -18,8 +19,19 @@ use crate::syntax::symbol::Symbol;
 
 /// Types of the standard that are not of the language yet.
 const LATER: &[&str] = &[
-    "WSTRING", "CHAR", "WCHAR", "DATE", "LDATE", "TOD", "LTOD", "TIME_OF_DAY", "LTIME_OF_DAY", "DT", "LDT",
-    "DATE_AND_TIME", "LDATE_AND_TIME",
+    "WSTRING",
+    "CHAR",
+    "WCHAR",
+    "DATE",
+    "LDATE",
+    "TOD",
+    "LTOD",
+    "TIME_OF_DAY",
+    "LTIME_OF_DAY",
+    "DT",
+    "LDT",
+    "DATE_AND_TIME",
+    "LDATE_AND_TIME",
 ];
 
 impl<'a> Analyzer<'a> {
@@ -176,7 +188,11 @@ impl<'a> Analyzer<'a> {
         let high = self.const_integer(&range.high, scope);
         let (low, high) = (low?, high?);
         if low > high {
-            self.report(&type_rules::BOUNDS, range.span, format!("the lower bound {low} is above the upper bound {high}"));
+            self.report(
+                &type_rules::BOUNDS,
+                range.span,
+                format!("the lower bound {low} is above the upper bound {high}"),
+            );
             return None;
         }
         Some((low, high))
@@ -200,7 +216,7 @@ impl<'a> Analyzer<'a> {
         let (least, most) = limits(elementary).unwrap_or((0, 0));
         let mut next: i128 = 0;
         let mut list: Vec<(Symbol, String, i64)> = Vec::with_capacity(values.len());
-        let mut seen = std::collections::HashSet::new();
+        let mut seen = std::collections::BTreeSet::new();
         for value in values {
             if value.name.is_missing() {
                 continue;
@@ -296,7 +312,7 @@ impl<'a> Analyzer<'a> {
 
     fn struct_type(&mut self, fields: &'a [VarDecl], scope: Option<PouId>, name: Option<&Ident>, span: Span) -> Ty {
         let mut list: Vec<FieldDef> = Vec::new();
-        let mut seen = std::collections::HashSet::new();
+        let mut seen = std::collections::BTreeSet::new();
         let mut sound = true;
         for field in fields {
             let (ty, default) = self.resolve_spec(&field.ty, scope);

@@ -5,9 +5,7 @@ use khz_machine::library::functions::{self, FunctionRow, ResultRule, StandardFun
 
 use super::expr::{Checker, broken};
 use super::tree::{BinOp, Expr, ExprKind, TextOp, UnOp};
-use super::types::{
-    BOOL, Const, DINT, INT, Ty, elementary_by_name, is_bits, is_duration, is_integer, is_real,
-};
+use super::types::{BOOL, Const, DINT, INT, Ty, elementary_by_name, is_bits, is_duration, is_integer, is_real};
 use crate::diagnostics::{semantic as names, types as rules};
 use crate::source::Span;
 use crate::syntax::ast::{self, Arg, ArgKind, Ident};
@@ -162,15 +160,29 @@ impl<'a> Checker<'_, 'a> {
 
     fn row_result(&mut self, row: &FunctionRow, mut values: Vec<Expr>, span: Span, want: Ty) -> Expr {
         let compares = [
-            (F::Gt, BinOp::Gt), (F::Ge, BinOp::Ge), (F::Eq, BinOp::Eq), (F::Le, BinOp::Le), (F::Lt, BinOp::Lt), (F::Ne, BinOp::Ne),
+            (F::Gt, BinOp::Gt),
+            (F::Ge, BinOp::Ge),
+            (F::Eq, BinOp::Eq),
+            (F::Le, BinOp::Le),
+            (F::Lt, BinOp::Lt),
+            (F::Ne, BinOp::Ne),
         ];
         if let Some((_, op)) = compares.iter().find(|(function, _)| *function == row.function) {
-            return self.compare_chain(*op, values, span);
+            return self.compare_chain(*op, &values, span);
         }
         match row.function {
-            F::Add | F::Mul | F::Sub | F::Div | F::Mod | F::And | F::Or | F::Xor | F::Expt | F::Min | F::Max | F::Atan2 => {
-                self.fold_left(row.function, values, span, want)
-            }
+            F::Add
+            | F::Mul
+            | F::Sub
+            | F::Div
+            | F::Mod
+            | F::And
+            | F::Or
+            | F::Xor
+            | F::Expt
+            | F::Min
+            | F::Max
+            | F::Atan2 => self.fold_left(row.function, values, span, want),
             F::Limit => {
                 let high = values.pop();
                 values.swap(0, 1); // MAX(IN, MN), then MIN with MX.
@@ -178,9 +190,18 @@ impl<'a> Checker<'_, 'a> {
                 let Some(high) = high else { return broken(span) };
                 self.fold_left(F::Min, vec![inner, high], span, want)
             }
-            F::Not | F::Abs | F::Sqrt | F::Ln | F::Log | F::Exp | F::Sin | F::Cos | F::Tan | F::Asin | F::Acos | F::Atan => {
-                self.unary_call(row.function, values, span, want)
-            }
+            F::Not
+            | F::Abs
+            | F::Sqrt
+            | F::Ln
+            | F::Log
+            | F::Exp
+            | F::Sin
+            | F::Cos
+            | F::Tan
+            | F::Asin
+            | F::Acos
+            | F::Atan => self.unary_call(row.function, values, span, want),
             F::Trunc => {
                 let wanted = self.an.types.elementary(want).filter(|ty| is_integer(*ty)).unwrap_or(E::Dint);
                 let Some(value) = values.pop() else { return broken(span) };
@@ -194,7 +215,7 @@ impl<'a> Checker<'_, 'a> {
         }
     }
 
-    fn compare_chain(&mut self, op: BinOp, values: Vec<Expr>, span: Span) -> Expr {
+    fn compare_chain(&mut self, op: BinOp, values: &[Expr], span: Span) -> Expr {
         let mut found: Option<Expr> = None;
         for pair in values.windows(2) {
             let [a, b] = pair else { continue };
@@ -239,17 +260,17 @@ impl<'a> Checker<'_, 'a> {
     fn settle_number(&mut self, value: Expr, want: Ty, real: bool) -> Expr {
         if real && value.ty == Ty::IntLit {
             let to = if self.an.types.elementary(want) == Some(E::Real) { E::Real } else { E::Lreal };
-            return self.literal(value, to);
+            return self.literal(&value, to);
         }
-        if real { self.to_real(value, want) } else { value }
+        if real { self.as_real(value, want) } else { value }
     }
 
     /// An operand of a function over ANY_REAL: an integer becomes an LREAL.
-    fn to_real(&mut self, value: Expr, want: Ty) -> Expr {
+    fn as_real(&mut self, value: Expr, want: Ty) -> Expr {
         let value = match value.ty {
             Ty::IntLit | Ty::RealLit => {
                 let to = if self.an.types.elementary(want) == Some(E::Real) { E::Real } else { E::Lreal };
-                return self.literal(value, to);
+                return self.literal(&value, to);
             }
             _ => value,
         };
@@ -282,7 +303,7 @@ impl<'a> Checker<'_, 'a> {
         };
         let value = match op {
             UnOp::Not | UnOp::Abs => self.settle(value, want),
-            _ => self.to_real(value, want),
+            _ => self.as_real(value, want),
         };
         if value.ty == Ty::Error {
             return broken(span);

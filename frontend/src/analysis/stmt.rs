@@ -48,7 +48,9 @@ impl<'a> Checker<'_, 'a> {
                     .collect(),
                 otherwise: otherwise.as_ref().map(|block| self.block(block)).unwrap_or_default(),
             },
-            ast::StmtKind::Case { selector, arms, otherwise } => return self.case(selector, arms, otherwise.as_ref(), span),
+            ast::StmtKind::Case { selector, arms, otherwise } => {
+                return self.case(selector, arms, otherwise.as_ref(), span);
+            }
             ast::StmtKind::For { variable, from, to, by, body, end_span } => {
                 let control = self.control(variable);
                 self.loop_depth += 1;
@@ -169,7 +171,7 @@ impl<'a> Checker<'_, 'a> {
         let found = if found.ty == Ty::IntLit && self.is_enum(ty) {
             // Numbers select enumeration values in vendors' code.
             let elementary = self.an.types.elementary(ty)?;
-            self.literal(found, elementary)
+            self.literal(&found, elementary)
         } else {
             self.coerce(found, base)
         };
@@ -177,7 +179,11 @@ impl<'a> Checker<'_, 'a> {
             _ if found.ty == Ty::Error => None,
             ExprKind::Const(value) => self.number(ty, value),
             _ => {
-                self.an.report(&names::NOT_CONSTANT, expr.span, "a label of a CASE must be known when the program is compiled");
+                self.an.report(
+                    &names::NOT_CONSTANT,
+                    expr.span,
+                    "a label of a CASE must be known when the program is compiled",
+                );
                 None
             }
         }
@@ -230,7 +236,7 @@ impl<'a> Checker<'_, 'a> {
     fn step_value(&mut self, by: &'a ast::Expr, step_type: E) -> Expr {
         let found = self.expr(by, DINT);
         if found.ty == Ty::IntLit || found.ty == Ty::Error {
-            return if found.ty == Ty::Error { found } else { self.literal(found, step_type) };
+            return if found.ty == Ty::Error { found } else { self.literal(&found, step_type) };
         }
         match self.an.types.elementary(found.ty) {
             Some(ty) if (is_integer(ty) || is_bits(ty)) && !self.is_enum(found.ty) => {
@@ -255,25 +261,27 @@ impl<'a> Checker<'_, 'a> {
 fn skip_when_disabled(stmt: Stmt) -> Stmt {
     let Stmt { kind, span } = stmt;
     let kind = match kind {
-        StmtKind::Assign { target, value: Expr { kind: ExprKind::Call(mut call), ty, span: at } } if call.en.is_some() || call.eno.is_some() => {
+        StmtKind::Assign { target, value: Expr { kind: ExprKind::Call(mut call), ty, span: at } }
+            if call.en.is_some() || call.eno.is_some() =>
+        {
             let (en, eno) = (call.en.take(), call.eno.take());
             let value = Expr { kind: ExprKind::Call(call), ty, span: at };
-            guarded(en, eno, Stmt { kind: StmtKind::Assign { target, value }, span })
+            guarded(en, eno.as_ref(), Stmt { kind: StmtKind::Assign { target, value }, span })
         }
         StmtKind::Call(mut call) if call.en.is_some() || call.eno.is_some() => {
             let (en, eno) = (call.en.take(), call.eno.take());
-            guarded(en, eno, Stmt { kind: StmtKind::Call(call), span })
+            guarded(en, eno.as_ref(), Stmt { kind: StmtKind::Call(call), span })
         }
         other => other,
     };
     Stmt { kind, span }
 }
 
-fn guarded(en: Option<Expr>, eno: Option<Place>, inner: Stmt) -> StmtKind {
+fn guarded(en: Option<Expr>, eno: Option<&Place>, inner: Stmt) -> StmtKind {
     use super::types::BOOL;
     let span = inner.span;
     let set = |value: i64| {
-        eno.clone().map(|target| {
+        eno.cloned().map(|target| {
             let value = Expr { kind: ExprKind::Const(Const::Int(value)), ty: BOOL, span };
             Stmt { kind: StmtKind::Assign { target, value }, span }
         })

@@ -46,7 +46,8 @@ impl<'a> Analyzer<'a> {
             self.report(&rules::PRIORITY, task.name.span, message);
         }
         if !seen.contains(&TaskParamKind::Interval) && !seen.contains(&TaskParamKind::Single) {
-            let message = format!("the task `{}` has neither INTERVAL nor SINGLE, so it runs in every round", plan.name);
+            let message =
+                format!("the task `{}` has neither INTERVAL nor SINGLE, so it runs in every round", plan.name);
             self.report(&rules::FREEWHEELING, task.name.span, message);
         }
         for attribute in &task.attributes {
@@ -59,7 +60,9 @@ impl<'a> Analyzer<'a> {
         let Some(found) = Checker::declarations(self, None).constant(value, Ty::Void) else { return 0 };
         let number = match &found.1 {
             Const::Wide(number) => Some(*number),
-            Const::Int(number) if found.0 != BOOL && self.types.elementary(found.0).is_some_and(|ty| !is_duration(ty)) => {
+            Const::Int(number)
+                if found.0 != BOOL && self.types.elementary(found.0).is_some_and(|ty| !is_duration(ty)) =>
+            {
                 Some(i128::from(*number))
             }
             _ => None,
@@ -94,9 +97,18 @@ impl<'a> Analyzer<'a> {
             "watchdog_sensitivity" => value.parse().ok().map(|count| plan.watchdog_sensitivity = count),
             "phase" => duration().map(|us| plan.phase_us = us),
             "overrun" => match value.to_ascii_lowercase().as_str() {
-                "grid" => Some(plan.overrun_policy = OverrunPolicy::Grid),
-                "at-once" => Some(plan.overrun_policy = OverrunPolicy::AtOnce),
-                "realign" => Some(plan.overrun_policy = OverrunPolicy::Realign),
+                "grid" => {
+                    let _: () = plan.overrun_policy = OverrunPolicy::Grid;
+                    Some(())
+                }
+                "at-once" => {
+                    let _: () = plan.overrun_policy = OverrunPolicy::AtOnce;
+                    Some(())
+                }
+                "realign" => {
+                    let _: () = plan.overrun_policy = OverrunPolicy::Realign;
+                    Some(())
+                }
                 _ => None,
             },
             // Attributes of other tools.
@@ -131,25 +143,24 @@ impl<'a> Analyzer<'a> {
         instances: &[Symbol],
         environment: &Environment,
     ) -> Option<SinglePlan> {
-        if let AstKind::Member { base, member } = &value.kind {
-            if let AstKind::Name(name) = &base.kind {
-                if let Some(at) = instances.iter().position(|symbol| *symbol == name.symbol) {
-                    let program = plan.instances.get(at)?.program;
-                    let info = self.info(program)?;
-                    let found = (0u32..).map(VarId).zip(&info.vars).find(|(_, var)| var.symbol == member.symbol);
-                    return match found {
-                        Some((id, var)) if var.ty == BOOL && is_stored(var.class) => match var.located {
-                            Some(located) => Some(SinglePlan::Bit(located)),
-                            None => Some(SinglePlan::Instance(u32::try_from(at).unwrap_or(u32::MAX), id)),
-                        },
-                        _ => {
-                            let message = format!("{} has no BOOL variable `{}`", info.name, self.spelling(member));
-                            self.report(&rules::SINGLE, value.span, message);
-                            None
-                        }
-                    };
+        if let AstKind::Member { base, member } = &value.kind
+            && let AstKind::Name(name) = &base.kind
+            && let Some(at) = instances.iter().position(|symbol| *symbol == name.symbol)
+        {
+            let program = plan.instances.get(at)?.program;
+            let info = self.info(program)?;
+            let found = (0u32..).map(VarId).zip(&info.vars).find(|(_, var)| var.symbol == member.symbol);
+            return match found {
+                Some((id, var)) if var.ty == BOOL && is_stored(var.class) => match var.located {
+                    Some(located) => Some(SinglePlan::Bit(located)),
+                    None => Some(SinglePlan::Instance(u32::try_from(at).unwrap_or(u32::MAX), id)),
+                },
+                _ => {
+                    let message = format!("{} has no BOOL variable `{}`", info.name, self.spelling(member));
+                    self.report(&rules::SINGLE, value.span, message);
+                    None
                 }
-            }
+            };
         }
         let mut checker = Checker::body(self, None, environment);
         let expr = checker.expr(value, BOOL);

@@ -43,8 +43,6 @@ pub struct Project {
 pub struct PouInfo {
     /// Program, function or function block.
     pub kind: PouKind,
-    /// Folded name.
-    pub symbol: Symbol,
     /// Name as declared.
     pub name: String,
     /// Where its name stands.
@@ -422,7 +420,6 @@ pub enum ExprKind {
 
 /// Operators with one operand.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[expect(missing_docs, reason = "named as the functions of the standard")]
 pub enum UnOp {
     Neg,
     Not,
@@ -441,7 +438,6 @@ pub enum UnOp {
 
 /// Operators with two operands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[expect(missing_docs, reason = "named as the operators and functions of the standard")]
 pub enum BinOp {
     Add,
     Sub,
@@ -508,7 +504,6 @@ impl BinOp {
 
 /// Operations on strings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[expect(missing_docs, reason = "named as the functions of the standard")]
 pub enum TextOp {
     Len,
     Find,

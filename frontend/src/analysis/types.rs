@@ -3,7 +3,7 @@
 //! Arrays and subranges are interned, so that two spellings of one type are one type. Aliases vanish: a name stands for
 //! what it names. Sizes are computed when a type is defined, so that a type too large for any image is reported where it is declared.
 
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 use std::rc::Rc;
 
 use khz_bytecode::container::ElementaryType;
@@ -164,13 +164,16 @@ pub struct TyDef {
     pub depth: u32,
 }
 
+/// Lower and upper bound of each dimension.
+pub type Bounds = Rc<[(i32, i32)]>;
+
 /// All defined types.
 #[derive(Debug, Default)]
 pub struct TypeTable {
     /// The definitions, in order: a definition refers only to ones before it.
     pub defs: Vec<TyDef>,
-    arrays: HashMap<(Ty, Rc<[(i32, i32)]>), TyId>,
-    subranges: HashMap<(ElementaryType, i64, i64), TyId>,
+    arrays: BTreeMap<(Ty, Bounds), TyId>,
+    subranges: BTreeMap<(ElementaryType, i64, i64), TyId>,
 }
 
 impl TypeTable {
@@ -447,9 +450,5 @@ pub fn wrap(ty: ElementaryType, value: i128) -> i64 {
 /// The elementary type of a keyword, in upper case. Dates and wide characters are not of the language yet.
 pub fn elementary_by_name(name: &str) -> Option<ElementaryType> {
     use ElementaryType as E;
-    ElementaryType::ALL
-        .iter()
-        .copied()
-        .find(|ty| ty.name() == name)
-        .filter(|ty| *ty as u8 <= E::Ltime as u8)
+    ElementaryType::ALL.iter().copied().find(|ty| ty.name() == name).filter(|ty| *ty as u8 <= E::Ltime as u8)
 }

@@ -118,7 +118,11 @@ impl<'b, 'p> FunctionBuilder<'b, 'p> {
     }
 
     /// Ends the function: code, frame, and what the container says of it.
-    pub(super) fn finish(mut self, owner: Owner, epilogue: impl FnOnce(&mut Self)) -> (Function, Vec<(u32, Span)>, super::FunctionCost) {
+    pub(super) fn finish(
+        mut self,
+        owner: Owner,
+        epilogue: impl FnOnce(&mut Self),
+    ) -> (Function, Vec<(u32, Span)>, super::FunctionCost) {
         let end = self.end;
         self.e.bind(end);
         if self.e.is_reachable() {
@@ -132,11 +136,8 @@ impl<'b, 'p> FunctionBuilder<'b, 'p> {
             self.b.struct_type(fields, size, 8)
         });
         let frame_bytes = if frame.is_some() { self.frame_size.next_multiple_of(8) } else { 0 };
-        let cost = super::FunctionCost {
-            stack: self.e.max_depth,
-            frame_bytes,
-            callees: std::mem::take(&mut self.e.callees),
-        };
+        let cost =
+            super::FunctionCost { stack: self.e.max_depth, frame_bytes, callees: std::mem::take(&mut self.e.callees) };
         let (code, marks) = self.e.finish();
         let function = Function {
             owner,
@@ -308,7 +309,8 @@ impl<'b, 'p> FunctionBuilder<'b, 'p> {
         let elementary = self.elementary(found.control.ty);
         let address = self.address(&found.control);
         self.e.push(I::SlotLoad { place: SlotPlace::Local, index: slot }, 0, 1);
-        if let (true, Some(TyKind::Subrange { low, high, .. })) = (checks, self.b.project.types.kind(found.control.ty)) {
+        if let (true, Some(TyKind::Subrange { low, high, .. })) = (checks, self.b.project.types.kind(found.control.ty))
+        {
             self.check(elementary, *low, *high, found.control.span);
         }
         self.store_at(address, elementary.storage());
@@ -392,7 +394,8 @@ fn switch_targets(arms: &[CaseArm], labels: &[Label], default: Label, ty: E) -> 
     if ty.storage().value_type() != ValueType::I32 {
         return None;
     }
-    let ranges = || arms.iter().zip(labels).flat_map(|(arm, label)| arm.ranges.iter().map(move |range| (*range, *label)));
+    let ranges =
+        || arms.iter().zip(labels).flat_map(|(arm, label)| arm.ranges.iter().map(move |range| (*range, *label)));
     let low = ranges().map(|((low, _), _)| low).min()?;
     let high = ranges().map(|((_, high), _)| high).max()?;
     let values: i128 = ranges().map(|((low, high), _)| high - low + 1).sum();

@@ -63,7 +63,11 @@ impl FunctionBuilder<'_, '_> {
             match var.class {
                 VarClass::Input => {
                     let Some((_, value)) = call.inputs.iter().find(|(other, _)| *other == id) else { continue };
-                    if scalar { self.value(value) } else { self.composed_as(value, var.ty) }
+                    if scalar {
+                        self.value(value);
+                    } else {
+                        self.composed_as(value, var.ty);
+                    }
                     count += 1;
                 }
                 VarClass::InOut => {
@@ -82,7 +86,8 @@ impl FunctionBuilder<'_, '_> {
         }
         self.e.mark(call.span);
         let function = self.b.function_id(call.target);
-        let results: Vec<(VarId, Ty)> = result_vars(&info).filter(|(_, ty)| self.b.project.types.storage(*ty).is_some()).collect();
+        let results: Vec<(VarId, Ty)> =
+            result_vars(&info).filter(|(_, ty)| self.b.project.types.storage(*ty).is_some()).collect();
         let pushes = u32::try_from(results.len()).unwrap_or(0);
         self.e.push(I::Call { function }, count, pushes);
         let scalar_result = info.result.filter(|id| results.iter().any(|(other, _)| other == id));
@@ -94,7 +99,8 @@ impl FunctionBuilder<'_, '_> {
             outputs.push((*id, Home::Slot(SlotPlace::Local, slot)));
             taken.push(slot);
         }
-        let result_home = info.result.and_then(|id| outputs.iter().find(|(other, _)| *other == id).map(|(_, home)| *home));
+        let result_home =
+            info.result.and_then(|id| outputs.iter().find(|(other, _)| *other == id).map(|(_, home)| *home));
         self.calls.push(CallContext { instance: Home::None, outputs });
         for statement in &call.after {
             self.statement(statement);
@@ -105,10 +111,10 @@ impl FunctionBuilder<'_, '_> {
         }
         let result = info.result?;
         let ty = info.vars.get(result.0 as usize)?.ty;
-        if scalar_result.is_none() {
-            if let Some(Home::Bytes(place, offset)) = result_home {
-                self.push_address(place, offset, ty);
-            }
+        if scalar_result.is_none()
+            && let Some(Home::Bytes(place, offset)) = result_home
+        {
+            self.push_address(place, offset, ty);
         }
         Some(ty)
     }
@@ -121,7 +127,11 @@ impl FunctionBuilder<'_, '_> {
             _ => {
                 // The way to it is walked once; the reference waits in a slot of its own.
                 let target = self.b.type_id(instance.ty);
-                let slot = self.reference_slot(RefType { target, write: true, image: self.b.may_be_image(self.unit, instance) });
+                let slot = self.reference_slot(RefType {
+                    target,
+                    write: true,
+                    image: self.b.may_be_image(self.unit, instance),
+                });
                 self.e.push(I::SlotStore { place: SlotPlace::Local, index: slot }, 1, 0);
                 Home::Ref(slot)
             }

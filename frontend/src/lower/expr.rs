@@ -197,7 +197,8 @@ impl FunctionBuilder<'_, '_> {
         }
         // A shift of a narrow signed number is one of its extended form; a rotation has its own width.
         self.numeric(found);
-        let wraps = matches!(op, BinOp::Add | BinOp::Sub | BinOp::Mul | BinOp::Div | BinOp::Shl | BinOp::Rol | BinOp::Ror);
+        let wraps =
+            matches!(op, BinOp::Add | BinOp::Sub | BinOp::Mul | BinOp::Div | BinOp::Shl | BinOp::Rol | BinOp::Ror);
         if wraps {
             self.wrap(ty);
         }

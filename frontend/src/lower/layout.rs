@@ -59,7 +59,8 @@ impl Builder<'_> {
                 self.add_type(Type::Array(array))
             }
             (_, Some(TyKind::Struct { fields } | TyKind::Block { fields, .. })) => {
-                let list = fields.iter().map(|field| Field { offset: field.offset, ty: self.type_id(field.ty) }).collect();
+                let list =
+                    fields.iter().map(|field| Field { offset: field.offset, ty: self.type_id(field.ty) }).collect();
                 let (size, align) = project.types.extent(ty);
                 let record = Record { size, align, fields: list };
                 if matches!(project.types.kind(ty), Some(TyKind::Block { .. })) {
@@ -100,10 +101,10 @@ impl Builder<'_> {
                 for (to, from) in out.iter_mut().zip(bytes) {
                     *to = from;
                 }
-                if matches!(value, Const::Str(_)) {
-                    if let Some(last) = out.last_mut() {
-                        *last = 0;
-                    }
+                if matches!(value, Const::Str(_))
+                    && let Some(last) = out.last_mut()
+                {
+                    *last = 0;
                 }
             }
             (Value::Array(runs), Some(TyKind::Array { element, .. })) => {
@@ -215,7 +216,8 @@ impl Builder<'_> {
             },
             (_, Some(TyKind::Struct { fields } | TyKind::Block { fields, .. })) => {
                 let visible = fields.iter().filter(|field| !field.name.starts_with("__"));
-                let fields = visible.map(|field| (field.name.clone(), field.offset, self.debug_type(debug, field.ty))).collect();
+                let fields =
+                    visible.map(|field| (field.name.clone(), field.offset, self.debug_type(debug, field.ty))).collect();
                 DebugType::Record { name: project.types.name(ty), fields }
             }
             _ => {

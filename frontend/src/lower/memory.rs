@@ -139,7 +139,8 @@ impl Builder<'_> {
         let Some(info) = self.info(pou) else { return };
         let mut homes = vec![Home::None; info.vars.len()];
         let mut program = ProgramType::default();
-        let is_slot = |this: &Self, at: u32| this.wants_slot(pou, VarId(at)) && !this.spilled.contains(&(Some(pou), at));
+        let is_slot =
+            |this: &Self, at: u32| this.wants_slot(pou, VarId(at)) && !this.spilled.contains(&(Some(pou), at));
         let mut slots: Vec<(&str, u32)> = (0u32..)
             .zip(&info.vars)
             .filter(|(at, _)| is_slot(self, *at))

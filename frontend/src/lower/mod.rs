@@ -117,7 +117,11 @@ pub(crate) fn lower(
         None => Ok(container),
         Some(what) => {
             let span = plan.instances.first().map_or(Span::new(FileId(0), 0, 0), |instance| instance.span);
-            Err(Box::new(Diagnostic::new(&rules::LIMIT, span, format!("the resource `{}` has too many {what}", plan.name))))
+            Err(Box::new(Diagnostic::new(
+                &rules::LIMIT,
+                span,
+                format!("the resource `{}` has too many {what}", plan.name),
+            )))
         }
     }
 }
@@ -200,10 +204,13 @@ impl<'p> Builder<'p> {
     fn may_be_image(&self, unit: Option<PouId>, place: &Place) -> bool {
         match place.root {
             Root::Direct(_) => true,
-            Root::Global(global) => self.project.globals.get(global.0 as usize).is_some_and(|global| global.located.is_some()),
+            Root::Global(global) => {
+                self.project.globals.get(global.0 as usize).is_some_and(|global| global.located.is_some())
+            }
             Root::Var(var) => {
                 let Some(unit) = unit else { return false };
-                let located = self.infos.get(&unit).and_then(|info| info.vars.get(var.0 as usize)).and_then(|var| var.located);
+                let located =
+                    self.infos.get(&unit).and_then(|info| info.vars.get(var.0 as usize)).and_then(|var| var.located);
                 located.is_some() || self.image_parameters.contains(&(unit, var))
             }
             _ => false,

@@ -91,7 +91,8 @@ impl FunctionBuilder<'_, '_> {
         for step in steps {
             match step {
                 Step::Field(owner, field) => {
-                    let def = self.b.project.types.fields(Ty::User(*owner)).and_then(|fields| fields.get(*field as usize));
+                    let def =
+                        self.b.project.types.fields(Ty::User(*owner)).and_then(|fields| fields.get(*field as usize));
                     let (offset, field_ty) = def.map_or((0, Ty::Error), |def| (def.offset, def.ty));
                     match &mut at {
                         Some((_, base)) => *base = base.saturating_add(offset),

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use khz_bytecode::container::{
-    BlockInstance, Container, DebugPlace, DebugSection, DebugVariable, InitRun, LineEntry, Parameters, ProgramInstance, Region,
-    RetainRange, SingleSource, SourceFile, Task, TaskExtension, TaskTable, TaskType,
+    BlockInstance, Container, DebugPlace, DebugSection, DebugVariable, InitRun, LineEntry, Parameters, ProgramInstance,
+    Region, RetainRange, SingleSource, SourceFile, Task, TaskExtension, TaskTable, TaskType,
 };
 use khz_bytecode::ids::{FunctionId, InstanceId, SlotIndex, TaskId};
 use khz_bytecode::limits::{FRAME_ALIGN_BYTES, MAX_CALL_DEPTH, MAX_STACK_DEPTH, SLOT_BYTES};
@@ -34,7 +34,8 @@ impl Builder<'_> {
         let mut instances = Vec::with_capacity(plan.instances.len());
         for (at, instance) in plan.instances.iter().enumerate() {
             let Some(info) = self.info(instance.program) else { continue };
-            let connected = !instance.copy_in.is_empty() || !instance.copy_out.is_empty() || !instance.inouts.is_empty();
+            let connected =
+                !instance.copy_in.is_empty() || !instance.copy_out.is_empty() || !instance.inouts.is_empty();
             let entry = if connected { self.lower_entry(instance, &info) } else { self.function_id(instance.program) };
             let (base, row) = self.place_instance(at, instance, entry);
             bases.push(base);
@@ -62,7 +63,12 @@ impl Builder<'_> {
     }
 
     fn place_instance(&mut self, at: usize, instance: &InstancePlan, entry: FunctionId) -> (Base, ProgramInstance) {
-        let program = self.programs.get(&instance.program).and_then(|id| self.section.programs.get(id.index())).cloned().unwrap_or_default();
+        let program = self
+            .programs
+            .get(&instance.program)
+            .and_then(|id| self.section.programs.get(id.index()))
+            .cloned()
+            .unwrap_or_default();
         let slot_offset = self.id16(self.section.slots.len(), "slots");
         let slot_count = self.id16(program.slots.len(), "slots");
         if self.section.slots.len() + program.slots.len() < usize::from(u16::MAX) {
@@ -78,7 +84,12 @@ impl Builder<'_> {
                 _ => (0, 1),
             };
             base.data = self.data_room(block, extent.0, extent.1, false);
-            self.section.block_instances.push(BlockInstance { offset: base.data, stride: extent.0, count: 1, ty: block });
+            self.section.block_instances.push(BlockInstance {
+                offset: base.data,
+                stride: extent.0,
+                count: 1,
+                ty: block,
+            });
             self.block_rows(block, base.data);
         }
         let block_end = self.id16(self.section.block_instances.len(), "function block instances");
@@ -116,20 +127,29 @@ impl Builder<'_> {
     }
 
     /// Calls back with every stored variable of the resource: home relative to nothing but the image, type, initial value, retained.
-    fn each_variable(&self, bases: &[Base], mut found: impl FnMut(Option<(&InstancePlan, &PouInfo, usize)>, usize, Home)) {
+    fn each_variable(
+        &self,
+        bases: &[Base],
+        mut found: impl FnMut(Option<(&InstancePlan, &PouInfo, usize)>, usize, Home),
+    ) {
         for id in &self.plan.globals {
             if let Some(home) = self.global_homes.get(id) {
                 found(None, id.0 as usize, *home);
             }
         }
         for (instance, base) in self.plan.instances.iter().zip(bases) {
-            let (Some(info), Some(homes)) = (self.infos.get(&instance.program), self.unit_homes.get(&instance.program)) else { continue };
+            let (Some(info), Some(homes)) = (self.infos.get(&instance.program), self.unit_homes.get(&instance.program))
+            else {
+                continue;
+            };
             for (at, home) in homes.iter().enumerate() {
                 let home = match *home {
                     Home::Slot(SlotPlace::Program, slot) => {
                         Home::Slot(SlotPlace::Global, SlotIndex(slot.0.saturating_add(base.slots)))
                     }
-                    Home::Bytes(BytePlace::Block, offset) => Home::Bytes(BytePlace::Data, base.data.saturating_add(offset)),
+                    Home::Bytes(BytePlace::Block, offset) => {
+                        Home::Bytes(BytePlace::Data, base.data.saturating_add(offset))
+                    }
                     other => other,
                 };
                 found(Some((instance, info, at)), at, home);
@@ -166,7 +186,11 @@ impl Builder<'_> {
         // Variables in the process image may share bytes: what the last one says counts.
         for ((region, offset), byte) in image {
             match self.section.init_image.last_mut() {
-                Some(last) if last.region == region && last.repeat == 1 && last.offset as usize + last.bytes.len() == offset as usize => {
+                Some(last)
+                    if last.region == region
+                        && last.repeat == 1
+                        && last.offset as usize + last.bytes.len() == offset as usize =>
+                {
                     last.bytes.push(byte);
                 }
                 _ => self.section.init_image.push(InitRun { region, offset, repeat: 1, bytes: vec![byte] }),
@@ -232,7 +256,11 @@ impl Builder<'_> {
             let Some((ty, true)) = found else { return };
             match home {
                 Home::Slot(_, slot) => {
-                    ranges.push(RetainRange { region: Region::Slots, offset: u32::from(slot.0) * SLOT_BYTES, bytes: SLOT_BYTES });
+                    ranges.push(RetainRange {
+                        region: Region::Slots,
+                        offset: u32::from(slot.0) * SLOT_BYTES,
+                        bytes: SLOT_BYTES,
+                    });
                 }
                 Home::Bytes(BytePlace::Data, offset) => {
                     ranges.push(RetainRange { region: Region::Data, offset, bytes: project.types.extent(ty).0 });
@@ -256,10 +284,13 @@ impl Builder<'_> {
             SinglePlan::Bit(located) => {
                 SingleSource::Bit { place: located.place, offset: located.offset, bit: located.bit.unwrap_or(0) }
             }
-            SinglePlan::Global(global) => source(self.global_homes.get(global).copied().unwrap_or(Home::None), Base::default()),
+            SinglePlan::Global(global) => {
+                source(self.global_homes.get(global).copied().unwrap_or(Home::None), Base::default())
+            }
             SinglePlan::Instance(at, VarId(var)) => {
                 let base = bases.get(*at as usize).copied().unwrap_or_default();
-                let homes = self.plan.instances.get(*at as usize).and_then(|instance| self.unit_homes.get(&instance.program));
+                let homes =
+                    self.plan.instances.get(*at as usize).and_then(|instance| self.unit_homes.get(&instance.program));
                 source(homes.and_then(|homes| homes.get(*var as usize)).copied().unwrap_or(Home::None), base)
             }
         };
@@ -338,7 +369,8 @@ impl Builder<'_> {
     }
 
     fn string_total(&self) -> u32 {
-        let globals = self.plan.globals.iter().filter_map(|id| self.project.globals.get(id.0 as usize)).map(|global| global.ty);
+        let globals =
+            self.plan.globals.iter().filter_map(|id| self.project.globals.get(id.0 as usize)).map(|global| global.ty);
         let mut total: u64 = globals.map(|ty| self.string_bytes(ty)).sum();
         for instance in &self.plan.instances {
             let vars = self.infos.get(&instance.program).into_iter().flat_map(|info| &info.vars);
@@ -352,7 +384,10 @@ impl Builder<'_> {
         let _ = names;
         let files: Vec<SourceFile> = sources
             .files()
-            .map(|(id, file)| SourceFile { name: file.name().to_owned(), hash: hashes.files.get(id.index()).copied().unwrap_or_default() })
+            .map(|(id, file)| SourceFile {
+                name: file.name().to_owned(),
+                hash: hashes.files.get(id.index()).copied().unwrap_or_default(),
+            })
             .collect();
         let mut types = DebugTypes::default();
         let variables = self.debug_variables(&mut types, bases);
@@ -385,7 +420,9 @@ impl Builder<'_> {
             }
         });
         let usage = &self.plan.usage;
-        for (used, long, name) in [(usage.up_time, false, "__SYSTEM_UP_TIME"), (usage.up_ltime, true, "__SYSTEM_UP_LTIME")] {
+        for (used, long, name) in
+            [(usage.up_time, false, "__SYSTEM_UP_TIME"), (usage.up_ltime, true, "__SYSTEM_UP_LTIME")]
+        {
             if used == Some(true) {
                 use khz_bytecode::container::ElementaryType as E;
                 found.push((name.to_owned(), self.system_home(long), Ty::Elem(if long { E::Ltime } else { E::Time })));
@@ -414,7 +451,9 @@ impl Builder<'_> {
                 let entry = LineEntry { function, offset, file, line: place.line, column: place.column };
                 match lines.last_mut() {
                     Some(last) if last.function == function && last.offset == offset => *last = entry,
-                    Some(last) if last.function == function && (last.file, last.line, last.column) == (file, entry.line, entry.column) => {}
+                    Some(last)
+                        if last.function == function
+                            && (last.file, last.line, last.column) == (file, entry.line, entry.column) => {}
                     _ => lines.push(entry),
                 }
             }

@@ -166,7 +166,7 @@ impl FunctionBuilder<'_, '_> {
         self.reference(target);
         match &value.kind {
             // Straight into the target where no operand can be the target.
-            ExprKind::Text(op, parts) if parts.iter().all(|part| is_apart(part)) => {
+            ExprKind::Text(op, parts) if parts.iter().all(is_apart) => {
                 self.text_operation(*op, parts, target.ty);
             }
             _ => self.assign_text_from(value, target.ty),
@@ -189,7 +189,7 @@ impl FunctionBuilder<'_, '_> {
 fn is_apart(part: &Expr) -> bool {
     match &part.kind {
         ExprKind::Const(_) => true,
-        ExprKind::Text(_, parts) => parts.iter().all(|part| is_apart(part)),
+        ExprKind::Text(_, parts) => parts.iter().all(is_apart),
         _ => false,
     }
 }

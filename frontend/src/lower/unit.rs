@@ -29,7 +29,13 @@ impl<'p> Builder<'p> {
         }
     }
 
-    pub(super) fn add_function(&mut self, name: String, function: Function, marks: Vec<(u32, Span)>, cost: FunctionCost) -> FunctionId {
+    pub(super) fn add_function(
+        &mut self,
+        name: String,
+        function: Function,
+        marks: Vec<(u32, Span)>,
+        cost: FunctionCost,
+    ) -> FunctionId {
         let id = FunctionId(self.id16(self.functions.len(), "functions"));
         self.functions.push(function);
         self.function_names.push(name);
@@ -42,7 +48,9 @@ impl<'p> Builder<'p> {
         match info.kind {
             PouKind::Function => Owner::None,
             PouKind::Program => Owner::Program(self.programs.get(&pou).copied().unwrap_or_default()),
-            PouKind::FunctionBlock => info.block.map_or(Owner::None, |block| Owner::Block(self.type_id(Ty::User(block)))),
+            PouKind::FunctionBlock => {
+                info.block.map_or(Owner::None, |block| Owner::Block(self.type_id(Ty::User(block))))
+            }
         }
     }
 
