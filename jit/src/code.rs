@@ -3,6 +3,7 @@
 //! This file may use `unsafe`: it frees code when its last holder goes, and it calls code with the interface that the lowering gave it.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::sync::Arc;
 
 use cranelift_codegen::ir::{self, Signature};
@@ -12,12 +13,16 @@ use cranelift_codegen::{Context as Compilation, control::ControlPlane};
 use cranelift_jit::{ArenaMemoryProvider, JITBuilder, JITModule};
 use cranelift_module::{FuncId, Linkage, Module};
 use khz_bytecode::ids::FunctionId;
+use khz_bytecode::limits::MAX_TRAP_CHAIN;
+use khz_machine::engine::DeadlineCell;
+use khz_machine::image::ImageLayout;
 use khz_machine::trap::CodePlace;
 
 use crate::build::ProgramMemory;
 use crate::context::Context;
 use crate::lower::Linker;
 use crate::mir::{Place, PlaceData};
+use crate::runtime::Virtuals;
 use crate::{JitError, runtime};
 
 /// A function as it is compiled for a program's memory.
@@ -43,6 +48,8 @@ pub struct Code {
     pub places: Vec<PlaceEntry>,
     addresses: BTreeMap<Key, *const u8>,
     bytes: usize,
+    image_bytes: u32,
+    frames: Vec<Range<u32>>,
 }
 
 // SAFETY: finished code is never written; the addresses in it name its own memory.
@@ -105,13 +112,50 @@ impl Handle {
         &self.code
     }
 
-    /// Runs it; 0 means that it came to its end.
+    /// Runs it on an image; gives the status (0: it came to its end) and the context as the code left it.
+    ///
+    /// # Panics
+    /// When the image is not of the layout that the code was compiled for, or there is no such task.
+    pub fn run(
+        &self,
+        image: &mut [u8],
+        task_index: usize,
+        deadline: &DeadlineCell,
+        fuel: u64,
+        virtuals: &Virtuals,
+    ) -> (i32, Context) {
+        assert!(image.len() == self.code.image_bytes as usize, "the image is of another layout than the code");
+        let frame = self.code.frames.get(task_index).expect("the scheduler names only tasks that the container has");
+        let start = image.as_mut_ptr();
+        let mut context = Context {
+            deadline: deadline.as_atomic(),
+            fuel,
+            depth: 1,
+            trap_code: 0,
+            trap_place: 0,
+            chain_len: 0,
+            trap_values: [0; 3],
+            frame_limit: start.wrapping_add(frame.end as usize),
+            image: start,
+            image_bytes: image.len() as u64,
+            virtuals,
+            found_code: std::ptr::null(),
+            found_frame_bytes: 0,
+            chain: [0; MAX_TRAP_CHAIN + 1],
+        };
+        // SAFETY: the image has the size of the layout that the code was compiled for and is lent to this call alone; the deadline cell and the
+        // tables outlive it; entries have neither parameters nor results (the verifier's rule).
+        let status = unsafe { self.enter(&mut context, start.wrapping_add(frame.start as usize)) };
+        (status, context)
+    }
+
+    /// Calls the code.
     ///
     /// # Safety
     /// `context` is complete: its image is that of the layout that the code was compiled for, its deadline cell and tables outlive the call, and
     /// nobody else uses the image meanwhile. `frame` is the start of a task's frame bytes in that image. The function was compiled
     /// without parameters and results.
-    pub unsafe fn run(&self, context: &mut Context, frame: *mut u8) -> i32 {
+    unsafe fn enter(&self, context: &mut Context, frame: *mut u8) -> i32 {
         let image = context.image;
         match self.shared {
             None => {
@@ -254,15 +298,22 @@ impl Assembly {
         &self.stack_bytes
     }
 
-    /// Makes the code executable, and no longer writable.
+    /// Makes the code executable, and no longer writable. `layout` is that of the images it runs on.
     ///
     /// # Errors
     /// Memory that can not be protected.
-    pub fn finish(mut self) -> Result<Code, JitError> {
+    pub fn finish(mut self, layout: &ImageLayout) -> Result<Code, JitError> {
         self.module.finalize_definitions().map_err(|error| JitError::Memory(error.to_string()))?;
         let address = |id: &FuncId| self.module.get_finalized_function(*id);
         let addresses = self.functions.iter().map(|(key, id)| (*key, address(id))).collect();
-        Ok(Code { module: Some(self.module), places: self.places, addresses, bytes: self.bytes })
+        Ok(Code {
+            module: Some(self.module),
+            places: self.places,
+            addresses,
+            bytes: self.bytes,
+            image_bytes: layout.total_bytes(),
+            frames: layout.frames.clone(),
+        })
     }
 }
 

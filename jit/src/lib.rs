@@ -11,7 +11,7 @@
 //! - The lowering decides nothing, so that every improvement is a pass on one small form, with tests that show it before and after.
 //! - Code is owned by an `Arc` that each handle holds and is freed when the last one goes. It is never written after it was finished.
 //!
-//! `unsafe` stands in three files: `code.rs` (memory of code, calling into it), `run.rs` (one call of it) and `runtime.rs` (what code calls).
+//! `unsafe` stands in two files: `code.rs` (memory of code, calling into it) and `runtime.rs` (what code calls).
 
 pub mod build;
 pub mod context;

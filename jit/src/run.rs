@@ -12,7 +12,6 @@ use khz_machine::engine::{Engine, Entry, Limits};
 use khz_machine::image::Image;
 use khz_machine::instance_map::InstanceMap;
 use khz_machine::trap::{CodePlace, Trap};
-use std::ops::Range;
 
 use crate::build::{ProgramMemory, Scope, build};
 use crate::code::{Assembly, Code, Handle, Key, host_isa};
@@ -69,7 +68,7 @@ pub(crate) fn compile(scope: &Scope<'_>, plan: &Plan, options: JitOptions) -> Re
     if needed_bytes > MAX_STACK_BYTES {
         return Err(JitError::Stack { needed_bytes, limit_bytes: MAX_STACK_BYTES });
     }
-    Ok((assembly.finish()?, needed_bytes))
+    Ok((assembly.finish(scope.layout)?, needed_bytes))
 }
 
 /// What the deepest nesting of calls may take of a thread's stack: the longest chain of direct calls, or, where virtual calls may recurse, the
@@ -104,8 +103,6 @@ pub(crate) struct Parts {
     startup: Option<Handle>,
     instances: Vec<Handle>,
     virtuals: Box<Virtuals>,
-    frames: Vec<Range<u32>>,
-    image_bytes: u32,
     stack_bytes: u64,
     code: Arc<Code>,
 }
@@ -127,8 +124,6 @@ impl Parts {
             startup: plan.startup.as_ref().map(handle).transpose()?,
             instances: plan.instances.iter().map(handle).collect::<Result<_, _>>()?,
             virtuals: Box::new(Virtuals { map: InstanceMap::new(container), entries: entries.collect() }),
-            frames: scope.layout.frames.clone(),
-            image_bytes: scope.layout.total_bytes(),
             stack_bytes,
             code,
         })
@@ -204,31 +199,9 @@ impl Engine for Jit {
     /// When the container has no such entry, the image is not of the layout that the code was compiled for, or there is no such task.
     fn run(&mut self, entry: Entry, image: &mut Image, limits: Limits<'_>) -> Result<(), Trap> {
         let handle = self.handle(entry).expect("the scheduler runs only entries that the container has");
-        let frame =
-            self.parts.frames.get(limits.task_index).expect("the scheduler names only tasks that the container has");
-        let bytes = image.bytes_mut();
-        assert!(bytes.len() == self.parts.image_bytes as usize, "the image is of another layout than the code");
-        let start = bytes.as_mut_ptr();
-        let mut context = Context {
-            deadline: limits.deadline.as_atomic(),
-            fuel: limits.fuel.as_ref().map_or(u64::MAX, |fuel| fuel.left),
-            depth: 1,
-            trap_code: 0,
-            trap_place: 0,
-            chain_len: 0,
-            trap_values: [0; 3],
-            frame_limit: start.wrapping_add(frame.end as usize),
-            image: start,
-            image_bytes: bytes.len() as u64,
-            virtuals: &raw const *self.parts.virtuals,
-            found_code: std::ptr::null(),
-            found_frame_bytes: 0,
-            chain: [0; khz_bytecode::limits::MAX_TRAP_CHAIN + 1],
-        };
-        let frame = start.wrapping_add(frame.start as usize);
-        // SAFETY: the image has the size of the layout that the code was compiled for and is lent to this call alone; the deadline cell
-        // outlives it; the tables belong to this engine; entries have neither parameters nor results (the verifier's rule).
-        let status = unsafe { handle.run(&mut context, frame) };
+        let fuel = limits.fuel.as_ref().map_or(u64::MAX, |fuel| fuel.left);
+        let virtuals = &self.parts.virtuals;
+        let (status, context) = handle.run(image.bytes_mut(), limits.task_index, limits.deadline, fuel, virtuals);
         let outcome = if status == 0 { Ok(()) } else { Err(self.trap(&context)) };
         if let Some(fuel) = limits.fuel {
             fuel.left = if context.trap_code == OUT_OF_FUEL { 0 } else { context.fuel };
