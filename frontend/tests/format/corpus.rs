@@ -8,7 +8,8 @@ use std::path::{Path, PathBuf};
 /// All Structured Text files of the repository: path and text.
 pub fn programs() -> Vec<(String, String)> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the crate lies in the workspace");
-    let mut folders = vec![root.join("examples"), root.join("tests"), root.join("frontend/tests"), root.join("benches")];
+    let mut folders =
+        vec![root.join("examples"), root.join("tests"), root.join("frontend/tests"), root.join("benches")];
     let mut files: Vec<PathBuf> = Vec::new();
     while let Some(folder) = folders.pop() {
         let Ok(entries) = std::fs::read_dir(&folder) else { continue };

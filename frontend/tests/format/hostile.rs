@@ -10,8 +10,10 @@ use std::time::{Duration, Instant};
 #[test]
 fn cut_at_every_byte() {
     let options = FormatOptions::default();
-    for (name, text) in programs().iter().filter(|(_, text)| text.len() < 6000) {
-        for end in (0..text.len()).filter(|&end| text.is_char_boundary(end)) {
+    // Every byte of the small files; of the large ones each byte comes up in a small one too, so every 41st is enough.
+    for (name, text) in &programs() {
+        let step = if text.len() < 800 { 1 } else { 41 };
+        for end in (0..text.len()).step_by(step).filter(|&end| text.is_char_boundary(end)) {
             let cut = &text[..end];
             match format(cut, &options) {
                 Ok(formatted) => assert_eq!(format(&formatted, &options), Ok(formatted), "{name} cut at {end}"),
@@ -24,7 +26,8 @@ fn cut_at_every_byte() {
 
 #[test]
 fn syntax_errors_are_given_with_their_places() {
-    let Err(FormatError::Syntax(found)) = format("PROGRAM p\n  x := ;\nEND_PROGRAM\n", &FormatOptions::default()) else {
+    let Err(FormatError::Syntax(found)) = format("PROGRAM p\n  x := ;\nEND_PROGRAM\n", &FormatOptions::default())
+    else {
         panic!("a text with a syntax error was formatted");
     };
     assert_eq!(found.len(), 1);
@@ -47,7 +50,7 @@ fn hostile(many: usize) -> Vec<String> {
     let deep = 120;
     vec![
         body(format!("x := f({}1);", "1, ".repeat(many))),
-        body(format!("f{};", format!("({}x", "a, ".repeat(many / deep)).repeat(1) + ")")),
+        body(format!("f({}x);", "a + b, ".repeat(many))),
         body(format!("x := {}1{};", "f(a, ".repeat(deep), ")".repeat(deep))),
         body(format!("x := {}1{}", "(".repeat(deep), ")".repeat(deep) + ";")),
         body(format!("{}{}", "IF a THEN x := f(1, // c\n 2); ".repeat(deep), "END_IF; ".repeat(deep))),
@@ -82,7 +85,7 @@ fn much_of_one_thing() {
 
 #[test]
 fn time_is_linear() {
-    for (at, text) in hostile(60_000).iter().enumerate() {
+    for (at, text) in hostile(20_000).iter().enumerate() {
         let start = Instant::now();
         // Whether it parses does not matter here: some are beyond the parser's limits.
         let _ = format(text, &FormatOptions::default());

@@ -1,5 +1,7 @@
 //! The formatter: what it makes of the golden files, and what holds for every text.
 
+#![expect(clippy::missing_panics_doc, reason = "tests panic when they fail")]
+
 mod corpus;
 mod golden;
 mod hostile;
