@@ -73,6 +73,8 @@ pub(super) fn literals(op: BinOp, a: &Const, b: &Const) -> Result<Const, Unfolde
                 BinOp::And => Some(a & b),
                 BinOp::Or => Some(a | b),
                 BinOp::Xor => Some(a ^ b),
+                BinOp::Min => Some(*a.min(b)),
+                BinOp::Max => Some(*a.max(b)),
                 _ => return compare(op, Some(a.cmp(b))),
             };
             let found = found.ok_or(Unfolded::Overflow)?;
@@ -84,6 +86,8 @@ pub(super) fn literals(op: BinOp, a: &Const, b: &Const) -> Result<Const, Unfolde
             BinOp::Sub => Const::Lit(a - b, x - y),
             BinOp::Mul => Const::Lit(a * b, x * y),
             BinOp::Div => Const::Lit(a / b, x / y),
+            BinOp::Min => Const::Lit(if b < a { *b } else { *a }, if y < x { *y } else { *x }),
+            BinOp::Max => Const::Lit(if b > a { *b } else { *a }, if y > x { *y } else { *x }),
             _ => return compare(op, a.partial_cmp(b)),
         }),
         _ => Err(Unfolded::Unknown),
