@@ -1,0 +1,24 @@
+//! # khz-proof: the engines held against each other
+//!
+//! A claim of Kilohertz is that the interpreter and the native engine are one machine: the same values, traps, trap places and memory,
+//! after every scan. This crate looks for a program that says otherwise.
+//!
+//! [`bytecode`] makes containers that verify by construction, from a seed ([`random`]); [`evaluator`] is a third, slow, checked
+//! reading of the documents; [`oracle`] runs one container in all engines and names the first difference; [`shrink`] makes what differs small; [`mutate`] spoils
+//! container files to see whether the reader and the verifier let through anything that the engines then disagree about. [`statistics`]
+//! counts what was reached, because a search that never went there proves nothing.
+//!
+//! The crate knows engines only as [`khz_machine::engine::Engine`]: its user hands it makers of them. So it depends on neither, and a
+//! further engine or one with a pass switched off is one more maker. Nothing here reads a clock or the environment: a seed is a program.
+//!
+//! It is a tool of tests: where the verifier's promise is found broken it panics, and that is a finding.
+#![forbid(unsafe_code)]
+#![allow(clippy::missing_panics_doc, reason = "a panic of this crate is a finding, never a matter of its callers")]
+
+pub mod bytecode;
+pub mod evaluator;
+pub mod mutate;
+pub mod oracle;
+pub mod random;
+pub mod shrink;
+pub mod statistics;
