@@ -2,7 +2,7 @@
 
 mod programs;
 
-use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
+use criterion::{BatchSize, Criterion, criterion_main};
 use khz_bytecode::container;
 use khz_bytecode::limits::MAX_IMAGE_BYTES;
 use khz_bytecode::verify::verify;
@@ -30,7 +30,9 @@ fn engines(c: &mut Criterion) {
     let layout = program.layout(MAX_IMAGE_BYTES).expect("it fits");
     for kind in EngineKind::BOTH {
         assert!(program.engine(kind, &layout, false).expect("it compiles").code_bytes() > 0);
-        c.bench_function(&format!("compile/{kind:?}_ladder_500").to_lowercase(), |b| b.iter(|| program.engine(kind, &layout, false)));
+        c.bench_function(&format!("compile/{kind:?}_ladder_500").to_lowercase(), |b| {
+            b.iter(|| program.engine(kind, &layout, false));
+        });
     }
 }
 
@@ -43,7 +45,9 @@ fn scans(c: &mut Criterion) {
         for kind in EngineKind::BOTH {
             let mut engine = program.engine(kind, &layout, false).expect("it compiles");
             let mut image = program.image(MAX_IMAGE_BYTES).expect("it fits");
-            let mut scan = || engine.run(Entry::Instance(0), &mut image, Limits { deadline: &deadline, fuel: None, task_index: 0 });
+            let mut scan = || {
+                engine.run(Entry::Instance(0), &mut image, Limits { deadline: &deadline, fuel: None, task_index: 0 })
+            };
             for _ in 0..100 {
                 scan().expect("no trap");
             }
@@ -59,5 +63,10 @@ fn scans(c: &mut Criterion) {
     }
 }
 
-criterion_group!(benches, frontend, containers, engines, scans);
-criterion_main!(benches);
+#[allow(missing_docs, reason = "the macro makes a public function")]
+mod group {
+    use super::{containers, engines, frontend, scans};
+    criterion::criterion_group!(benches, frontend, containers, engines, scans);
+}
+
+criterion_main!(group::benches);

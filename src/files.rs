@@ -118,7 +118,10 @@ fn collect_folder(folder: &Path, files: &mut Vec<PathBuf>) -> Result<(), FileErr
             let entry = entry.map_err(refused)?;
             let kind = entry.file_type().map_err(refused)?;
             let path = entry.path();
-            let is_source = path.extension().and_then(|e| e.to_str()).is_some_and(|e| SOURCE_ENDINGS.iter().any(|s| e.eq_ignore_ascii_case(s)));
+            let is_source = path
+                .extension()
+                .and_then(|e| e.to_str())
+                .is_some_and(|e| SOURCE_ENDINGS.iter().any(|s| e.eq_ignore_ascii_case(s)));
             if kind.is_dir() && !entry.file_name().to_string_lossy().starts_with('.') {
                 folders.push(path);
             } else if is_source {

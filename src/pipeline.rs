@@ -117,7 +117,10 @@ fn program(name: String, container: Container) -> Result<Program, Refused> {
     let bytes = container::write(&container);
     let bytes = bytes.map_err(|error| Refused::TooLarge { resource: name.clone(), reason: error.to_string() })?;
     let verified = verify(container);
-    let verified = verified.map_err(|error| Refused::Verify { file: format!("RESOURCE {name}, as compiled (a fault of khz: please report it)"), error: Box::new(error) })?;
+    let verified = verified.map_err(|error| Refused::Verify {
+        file: format!("RESOURCE {name}, as compiled (a fault of khz: please report it)"),
+        error: Box::new(error),
+    })?;
     Ok(Program { name, verified: Arc::new(verified), container_bytes: bytes.len() })
 }
 

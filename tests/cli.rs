@@ -22,7 +22,14 @@ VAR_GLOBAL total : DINT := 7; END_VAR
 fn dump(scratch: &Scratch, extra: &[&str]) -> Value {
     let source = scratch.write("plant.st", PROGRAM);
     let path = scratch.path("dump.json");
-    let output = khz().args(["run", "--clock", "virtual", "--scans", "2"]).args(extra).arg("--dump-vars").arg(&path).arg(&source).output().unwrap();
+    let output = khz()
+        .args(["run", "--clock", "virtual", "--scans", "2"])
+        .args(extra)
+        .arg("--dump-vars")
+        .arg(&path)
+        .arg(&source)
+        .output()
+        .unwrap();
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
 }
@@ -54,7 +61,8 @@ fn a_dump_has_every_variable_as_the_page_says() {
 fn values_can_be_set_and_rows_applied() {
     let scratch = Scratch::new("set");
     let rows = scratch.write("rows.csv", "time_us,%IW0,main.flag\n0,16#00FF,\n10000,5,false\n");
-    let dump = dump(&scratch, &["--set", "MAIN.SMALL=16#7F", "--set", "main.p.x = 9", "--inputs", rows.to_str().unwrap()]);
+    let dump =
+        dump(&scratch, &["--set", "MAIN.SMALL=16#7F", "--set", "main.p.x = 9", "--inputs", rows.to_str().unwrap()]);
     let v = &dump["variables"];
     assert_eq!((&v["Main.small"], &v["Main.p"]["x"]), (&Value::from(127), &Value::from(9)));
     assert_eq!((&v["Main.seen"], &v["Main.c"]["n"]), (&Value::from(5), &Value::from(1)));
@@ -76,7 +84,8 @@ fn wrong_values_are_refused_with_their_place() {
         (&["--inputs", header.to_str().unwrap()], "header.csv:1", 1),
     ];
     for (words, part, status) in cases {
-        let output = khz().args(["run", "--clock", "virtual", "--scans", "1"]).args(words).arg(&source).output().unwrap();
+        let output =
+            khz().args(["run", "--clock", "virtual", "--scans", "1"]).args(words).arg(&source).output().unwrap();
         assert_eq!(output.status.code(), Some(status), "{words:?}: {}", stderr(&output));
         assert!(stderr(&output).contains(part), "{words:?}: {}", stderr(&output));
     }
@@ -108,7 +117,8 @@ fn a_stripped_container_behaves_the_same() {
 #[test]
 fn diagnostics_have_code_place_and_excerpt() {
     let scratch = Scratch::new("diagnostics");
-    let source = scratch.write("bad.st", "PROGRAM main\nVAR x : INT; END_VAR\n  x := 'text';\n  y := 1;\nEND_PROGRAM\n");
+    let source =
+        scratch.write("bad.st", "PROGRAM main\nVAR x : INT; END_VAR\n  x := 'text';\n  y := 1;\nEND_PROGRAM\n");
     let output = khz().arg("check").arg(&source).output().unwrap();
     assert_eq!(output.status.code(), Some(1));
     let text = stderr(&output);
@@ -139,12 +149,18 @@ fn every_listed_code_is_explained() {
 #[test]
 fn a_trap_is_one_json_object() {
     let scratch = Scratch::new("trap-json");
-    let source = scratch.write("trap.st", "PROGRAM main\nVAR a : ARRAY[1..3] OF INT; i : INT := 9; END_VAR\n  a[i] := 1;\nEND_PROGRAM\n");
+    let source = scratch.write(
+        "trap.st",
+        "PROGRAM main\nVAR a : ARRAY[1..3] OF INT; i : INT := 9; END_VAR\n  a[i] := 1;\nEND_PROGRAM\n",
+    );
     let output = khz().args(["run", "--format", "json"]).arg(&source).output().unwrap();
     assert_eq!(output.status.code(), Some(3), "{}", stderr(&output));
     let report: Value = serde_json::from_str(&stdout(&output)).unwrap();
     assert_eq!(report["trap"], "array index");
-    assert_eq!((report["line"].as_u64(), report["function"].as_str(), report["instance"].as_str()), (Some(3), Some("main"), Some("main")));
+    assert_eq!(
+        (report["line"].as_u64(), report["function"].as_str(), report["instance"].as_str()),
+        (Some(3), Some("main"), Some("main"))
+    );
     assert_eq!(report["values"], serde_json::json!({ "index": 9, "lower": 1, "upper": 3 }));
     assert!(report["file"].as_str().unwrap().ends_with("trap.st"));
 }
@@ -152,8 +168,16 @@ fn a_trap_is_one_json_object() {
 #[test]
 fn several_resources_want_a_choice() {
     let scratch = Scratch::new("resources");
-    let resource = |name: &str| format!("RESOURCE {name} ON PLC TASK t(INTERVAL := T#1ms, PRIORITY := 0); PROGRAM p WITH t : main; END_RESOURCE\n");
-    let text = format!("PROGRAM main VAR n : INT; END_VAR n := n + 1; END_PROGRAM\nCONFIGURATION c\n{}{}END_CONFIGURATION", resource("one"), resource("two"));
+    let resource = |name: &str| {
+        format!(
+            "RESOURCE {name} ON PLC TASK t(INTERVAL := T#1ms, PRIORITY := 0); PROGRAM p WITH t : main; END_RESOURCE\n"
+        )
+    };
+    let text = format!(
+        "PROGRAM main VAR n : INT; END_VAR n := n + 1; END_PROGRAM\nCONFIGURATION c\n{}{}END_CONFIGURATION",
+        resource("one"),
+        resource("two")
+    );
     let source = scratch.write("two.st", text);
     let output = khz().args(["run", "--scans", "1"]).arg(&source).output().unwrap();
     assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
@@ -170,12 +194,24 @@ fn statistics_and_bench_figures_are_json() {
     let scratch = Scratch::new("figures");
     let source = scratch.write("plant.st", PROGRAM);
     let stats = scratch.path("stats.json");
-    let output = khz().args(["run", "--clock", "virtual", "--scans", "10", "--stats"]).arg(&stats).arg(&source).output().unwrap();
+    let output = khz()
+        .args(["run", "--clock", "virtual", "--scans", "10", "--stats"])
+        .arg(&stats)
+        .arg(&source)
+        .output()
+        .unwrap();
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     let stats: Value = serde_json::from_str(&std::fs::read_to_string(stats).unwrap()).unwrap();
     assert_eq!(stats["tasks"][0]["scans"], 10);
     let (json, html) = (scratch.path("bench.json"), scratch.path("bench.html"));
-    let output = khz().args(["bench", "--scans", "1000", "--json"]).arg(&json).arg("--report").arg(&html).arg(&source).output().unwrap();
+    let output = khz()
+        .args(["bench", "--scans", "1000", "--json"])
+        .arg(&json)
+        .arg("--report")
+        .arg(&html)
+        .arg(&source)
+        .output()
+        .unwrap();
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     let rows: Value = serde_json::from_str(&std::fs::read_to_string(json).unwrap()).unwrap();
     assert_eq!((rows[0]["engine"].as_str(), rows[1]["engine"].as_str()), (Some("jit"), Some("interp")));
@@ -188,7 +224,9 @@ fn statistics_and_bench_figures_are_json() {
 fn disassembly_shows_each_form_beside_its_source() {
     let scratch = Scratch::new("disasm");
     let source = scratch.write("plant.st", PROGRAM);
-    for (form, part) in [(None, "slot.store"), (Some("--mir"), "loop"), (Some("--clif"), "function"), (Some("--asm"), "ret")] {
+    for (form, part) in
+        [(None, "slot.store"), (Some("--mir"), "loop"), (Some("--clif"), "function"), (Some("--asm"), "ret")]
+    {
         let output = khz().arg("disasm").args(form).arg(&source).output().unwrap();
         assert_eq!(output.status.code(), Some(0), "{form:?}: {}", stderr(&output));
         assert!(form == Some("--mir") || stdout(&output).contains(part), "{form:?}: {}", stdout(&output));

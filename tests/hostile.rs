@@ -11,7 +11,8 @@ use khz_frontend::{CompileOptions, SourceInput};
 use khz_machine::engine::{DeadlineCell, Entry, Fuel, Limits};
 use kilohertz::pipeline::{self, EngineKind, Program};
 
-const SMALL: &str = "PROGRAM main VAR n : INT; a : ARRAY[0..3] OF REAL; END_VAR n := n + 1; a[n MOD 4] := INT_TO_REAL(n); END_PROGRAM";
+const SMALL: &str =
+    "PROGRAM main VAR n : INT; a : ARRAY[0..3] OF REAL; END_VAR n := n + 1; a[n MOD 4] := INT_TO_REAL(n); END_PROGRAM";
 
 #[test]
 fn a_missing_file_is_named() {
@@ -61,7 +62,8 @@ fn a_container_cut_at_every_byte_is_refused() {
     let bytes = small_container();
     for length in 0..bytes.len() {
         let result = catch_unwind(|| container::read(&bytes[..length]));
-        let error = result.unwrap_or_else(|_| panic!("cut at {length}: panic")).expect_err("a cut container is refused");
+        let error =
+            result.unwrap_or_else(|_| panic!("cut at {length}: panic")).expect_err("a cut container is refused");
         assert!(!error.to_string().is_empty());
     }
 }
@@ -78,7 +80,8 @@ enum Fate {
 fn fate(bytes: &[u8]) -> Fate {
     let Ok(container) = container::read(bytes) else { return Fate::Unreadable };
     let Ok(verified) = verify(container) else { return Fate::Refused };
-    let program = Program { name: String::new(), verified: std::sync::Arc::new(verified), container_bytes: bytes.len() };
+    let program =
+        Program { name: String::new(), verified: std::sync::Arc::new(verified), container_bytes: bytes.len() };
     let Ok(layout) = program.layout(16 << 20) else { return Fate::Refused };
     let deadline = DeadlineCell::new();
     let runs: Vec<_> = EngineKind::BOTH

@@ -59,7 +59,12 @@ fn rounds(mut resource: Resource<Running>, count: usize) -> Resource<Running> {
 
 #[test]
 fn a_round_allocates_nothing() {
-    for path in ["examples/bottling.st", "tests/programs/strings.st", "tests/programs/blocks.st", "tests/schedules/three_tasks.st"] {
+    for path in [
+        "examples/bottling.st",
+        "tests/programs/strings.st",
+        "tests/programs/blocks.st",
+        "tests/schedules/three_tasks.st",
+    ] {
         let program = program(path);
         for kind in EngineKind::BOTH {
             let layout = program.layout(1 << 24).unwrap();

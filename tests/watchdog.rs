@@ -8,7 +8,8 @@ use std::time::Duration;
 
 use common::{Scratch, khz, stderr};
 
-const ENDLESS: &str = "PROGRAM main\nVAR n : DINT; END_VAR\n  WHILE TRUE DO\n    n := n + 1;\n  END_WHILE;\nEND_PROGRAM\n";
+const ENDLESS: &str =
+    "PROGRAM main\nVAR n : DINT; END_VAR\n  WHILE TRUE DO\n    n := n + 1;\n  END_WHILE;\nEND_PROGRAM\n";
 
 #[test]
 fn a_watchdog_ends_an_endless_loop_on_both_clocks() {
@@ -16,7 +17,11 @@ fn a_watchdog_ends_an_endless_loop_on_both_clocks() {
     let path = scratch.write("endless.st", ENDLESS);
     for engine in ["interp", "jit"] {
         for clock in ["real", "virtual"] {
-            let output = khz().args(["run", "--engine", engine, "--clock", clock, "--watchdog-us", "10000"]).arg(&path).output().unwrap();
+            let output = khz()
+                .args(["run", "--engine", engine, "--clock", clock, "--watchdog-us", "10000"])
+                .arg(&path)
+                .output()
+                .unwrap();
             let text = stderr(&output);
             assert_eq!(output.status.code(), Some(3), "{engine} {clock}: {text}");
             assert!(text.contains("watchdog"), "{engine} {clock}: {text}");
@@ -32,7 +37,12 @@ fn fuel_stops_both_engines_at_the_same_place() {
     let path = scratch.write("endless.st", ENDLESS);
     let dumps = ["interp", "jit"].map(|engine| {
         let dump = scratch.path(&format!("{engine}.json"));
-        let output = khz().args(["run", "--engine", engine, "--clock", "virtual", "--watchdog-us", "10000", "--dump-vars"]).arg(&dump).arg(&path).output().unwrap();
+        let output = khz()
+            .args(["run", "--engine", engine, "--clock", "virtual", "--watchdog-us", "10000", "--dump-vars"])
+            .arg(&dump)
+            .arg(&path)
+            .output()
+            .unwrap();
         assert_eq!(output.status.code(), Some(3));
         (std::fs::read_to_string(dump).unwrap(), stderr(&output))
     });

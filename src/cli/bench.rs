@@ -7,8 +7,8 @@ use std::time::Duration;
 
 use khz_scheduler::time::DurationNs;
 use khz_scheduler::{
-    Hooks, HostOptions, MonotonicClock, NoInputs, NoIo, NoObserver, RunOptions, RunOutcome, StatisticsReport, StopHandle, on_scan_thread,
-    run as run_rounds, stop_on_signals,
+    Hooks, HostOptions, MonotonicClock, NoInputs, NoIo, NoObserver, RunOptions, RunOutcome, StatisticsReport,
+    StopHandle, on_scan_thread, run as run_rounds, stop_on_signals,
 };
 use kilohertz::files::{self, Input};
 use kilohertz::pipeline::EngineKind;
@@ -74,7 +74,12 @@ fn frontend_ns(args: &BenchArgs) -> Result<u64, Failure> {
 }
 
 /// Figures of one engine, or none after a trap, which was reported.
-fn bench_engine(args: &BenchArgs, session: &Session<'_>, kind: EngineKind, frontend_ns: u64) -> Result<Option<Figures>, Failure> {
+fn bench_engine(
+    args: &BenchArgs,
+    session: &Session<'_>,
+    kind: EngineKind,
+    frontend_ns: u64,
+) -> Result<Option<Figures>, Failure> {
     let container = session.program.container().clone();
     let watch = Stopwatch::start();
     khz_bytecode::verify::verify(container).map_err(Failure::refused)?;
@@ -156,16 +161,23 @@ fn jitter(args: &BenchArgs, session: &Session<'_>) -> Outcome {
     };
     let mut rows = session.inputs(resource.image())?;
     let mut no_rows = NoInputs;
-    let running = resource.start().map_err(|f| Failure::Message(Status::Trap, format!("startup: {}", f.report().trap.code)))?;
+    let running =
+        resource.start().map_err(|f| Failure::Message(Status::Trap, format!("startup: {}", f.report().trap.code)))?;
     let duration = Duration::from_secs(args.duration);
     std::thread::spawn(move || {
         std::thread::sleep(duration);
         stop.request();
     });
     let (mut io, mut observer) = (NoIo, NoObserver);
-    let mut hooks = Hooks { io: &mut io, inputs: rows.as_mut().map_or(&mut no_rows as _, |rows| rows as _), observer: &mut observer };
+    let mut hooks = Hooks {
+        io: &mut io,
+        inputs: rows.as_mut().map_or(&mut no_rows as _, |rows| rows as _),
+        observer: &mut observer,
+    };
     let statistics = match run_rounds(running, &mut hooks, RunOptions { scans: args.scans }) {
-        RunOutcome::Completed(resource) | RunOutcome::NothingDue(resource) | RunOutcome::Stopped(resource) => resource.statistics(),
+        RunOutcome::Completed(resource) | RunOutcome::NothingDue(resource) | RunOutcome::Stopped(resource) => {
+            resource.statistics()
+        }
         RunOutcome::Faulted(faulted) => {
             let context = FaultContext { container: session.program.container() };
             report_fault(faulted.report(), &context, args.common.format);
@@ -199,4 +211,3 @@ fn print_jitter(args: &BenchArgs, session: &Session<'_>, statistics: &Statistics
     }
     Ok(Status::Done)
 }
-

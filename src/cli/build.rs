@@ -28,7 +28,10 @@ pub fn run(args: &BuildArgs) -> Outcome {
         return Err(Failure::refused("there is no PROGRAM in these files, so there is nothing to build"));
     }
     if args.common.format == Format::Json {
-        let rows: Vec<_> = written.iter().map(|(name, path, bytes)| json!({ "resource": name, "path": path, "bytes": bytes })).collect();
+        let rows: Vec<_> = written
+            .iter()
+            .map(|(name, path, bytes)| json!({ "resource": name, "path": path, "bytes": bytes }))
+            .collect();
         result(&json!(rows).to_string());
     } else {
         print_diagnostics(&loaded.diagnostics, &loaded.sources, Format::Human);

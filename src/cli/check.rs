@@ -1,11 +1,11 @@
 //! `khz check`: parse and analyse; every diagnostic of the run.
 
+use khz_frontend::diagnostics::{Severity, has_errors};
 use kilohertz::files;
 use kilohertz::files::Input;
-use khz_frontend::diagnostics::{Severity, has_errors};
 
 use super::args::{CheckArgs, Format};
-use super::output::{compile_options, people, print_diagnostics, load};
+use super::output::{compile_options, load, people, print_diagnostics};
 use super::{Outcome, Status};
 
 /// Runs it.

@@ -2,9 +2,9 @@
 
 use khz_machine::image::Image;
 use khz_machine::report::TrapReport;
-use kilohertz::pipeline::EngineKind;
 use khz_scheduler::{FaultPlace, Faulted, Hooks, NoInputs, NoIo, NoObserver, Resource, Round, Running};
 use khz_scheduler::{InputSource, Wake};
+use kilohertz::pipeline::EngineKind;
 use serde_json::json;
 
 use super::args::{DiffArgs, Format};
@@ -134,7 +134,13 @@ fn difference(session: &Session<'_>, sides: &[Side; 2], steps: &[Step; 2]) -> Op
     let differing = session.names.variables().flat_map(|v| session.names.leaves(&v, 10_000));
     let mut differing = differing.filter(|v| session.names.text(a, v) != session.names.text(b, v));
     Some(differing.next().map_or_else(
-        || format!("memory image differs at offset {at}: interp {:#04x}, jit {:#04x}", a.bytes()[at as usize], b.bytes()[at as usize]),
+        || {
+            format!(
+                "memory image differs at offset {at}: interp {:#04x}, jit {:#04x}",
+                a.bytes()[at as usize],
+                b.bytes()[at as usize]
+            )
+        },
         |v| format!("{}: interp {}, jit {}", v.name, session.names.text(a, &v), session.names.text(b, &v)),
     ))
 }

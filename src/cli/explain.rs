@@ -30,7 +30,8 @@ pub fn run(args: &ExplainArgs) -> Outcome {
         return Ok(Status::Done);
     };
     let entry = all.iter().find(|entry| entry.code.eq_ignore_ascii_case(wanted));
-    let entry = entry.ok_or_else(|| Failure::refused(format!("there is no code or trap `{wanted}`; `khz explain` lists all")))?;
+    let entry = entry
+        .ok_or_else(|| Failure::refused(format!("there is no code or trap `{wanted}`; `khz explain` lists all")))?;
     if args.common.format == Format::Json {
         let example = |text: &str| if text.is_empty() { Value::Null } else { Value::from(text) };
         let (wrong, right) = (example(entry.wrong), example(entry.right));
@@ -52,14 +53,23 @@ fn indented(text: &str) -> String {
 
 /// Every table: diagnostics, container errors, verifier rules, traps.
 fn entries() -> Vec<Entry> {
-    let plain = |code: String, kind, title: &str, text: &str| Entry { code, kind, title: title.into(), text: text.into(), wrong: "", right: "" };
+    let plain = |code: String, kind, title: &str, text: &str| Entry {
+        code,
+        kind,
+        title: title.into(),
+        text: text.into(),
+        wrong: "",
+        right: "",
+    };
     let rules = diagnostics::all_rules().map(|rule| Entry {
         wrong: rule.wrong,
         right: rule.right,
         ..plain(rule.code.into(), rule.severity.word(), rule.title, rule.explanation)
     });
-    let reads = ReadCode::ALL.iter().map(|code| plain(code.code().into(), "container error", code.title(), code.explanation()));
-    let verifier = VerifierRule::ALL.iter().map(|rule| plain(rule.code(), "verifier rule", rule.title(), rule.explanation()));
+    let reads =
+        ReadCode::ALL.iter().map(|code| plain(code.code().into(), "container error", code.title(), code.explanation()));
+    let verifier =
+        VerifierRule::ALL.iter().map(|rule| plain(rule.code(), "verifier rule", rule.title(), rule.explanation()));
     let traps = TrapCode::ALL.iter().map(|trap| plain(trap.name().into(), "trap", "ends a run", trap.text()));
     rules.chain(reads).chain(verifier).chain(traps).collect()
 }

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use kilohertz::files;
 use khz_machine::image::Image;
 use khz_machine::variables::{Variable, VariableTable};
 use khz_scheduler::InputSource;
+use kilohertz::files;
 
 use super::output::Failure;
 
@@ -14,8 +14,11 @@ pub fn set_values(names: &VariableTable, image: &mut Image, settings: &[String])
     for setting in settings {
         let (name, value) =
             setting.split_once('=').ok_or_else(|| Failure::usage(format!("--set {setting}: NAME=VALUE is wanted")))?;
-        let variable = names.resolve(name.trim()).map_err(|error| Failure::refused(format!("--set {setting}: {error}")))?;
-        names.write(image, &variable, value.trim()).map_err(|error| Failure::refused(format!("--set {setting}: {error}")))?;
+        let variable =
+            names.resolve(name.trim()).map_err(|error| Failure::refused(format!("--set {setting}: {error}")))?;
+        names
+            .write(image, &variable, value.trim())
+            .map_err(|error| Failure::refused(format!("--set {setting}: {error}")))?;
     }
     Ok(())
 }
@@ -40,7 +43,8 @@ impl CsvInputs {
     /// Reads and checks a whole file. Every cell is written once to a copy of the image, so that a wrong one is refused here, by line and column.
     pub fn read(path: &Path, names: &VariableTable, image: &Image) -> Result<Self, Failure> {
         let bytes = files::read_file(path)?;
-        let place = |line: u64, what: &dyn std::fmt::Display| Failure::refused(format!("{}:{line}: {what}", path.display()));
+        let place =
+            |line: u64, what: &dyn std::fmt::Display| Failure::refused(format!("{}:{line}: {what}", path.display()));
         let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(bytes.as_slice());
         let header = reader.headers().map_err(|error| place(1, &error))?.clone();
         if header.get(0).is_none_or(|name| !name.eq_ignore_ascii_case("time_us")) {

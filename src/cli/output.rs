@@ -3,12 +3,12 @@
 use std::io::{IsTerminal, Write};
 use std::path::Path;
 
-use kilohertz::files::{FileError, Input};
-use kilohertz::pipeline::{self, Loaded, Program, Refused};
 use khz_frontend::CompileOptions;
 use khz_frontend::Dialect;
 use khz_frontend::diagnostics::{Diagnostic, render};
 use khz_frontend::source::SourceMap;
+use kilohertz::files::{FileError, Input};
+use kilohertz::pipeline::{self, Loaded, Program, Refused};
 use serde_json::{Value, json};
 
 use super::Status;
@@ -113,7 +113,9 @@ pub fn choose(loaded: Loaded, wanted: Option<&str>) -> Result<Program, Failure> 
         Some(wanted) => programs
             .find(|p| p.name.eq_ignore_ascii_case(wanted))
             .ok_or_else(|| Failure::usage(format!("there is no RESOURCE `{wanted}`; there is {}", names.join(", ")))),
-        None if names.len() > 1 => Err(Failure::usage(format!("choose a RESOURCE with --resource: {}", names.join(", ")))),
+        None if names.len() > 1 => {
+            Err(Failure::usage(format!("choose a RESOURCE with --resource: {}", names.join(", "))))
+        }
         None => programs.next().ok_or_else(|| Failure::refused("there is no PROGRAM to run in these files")),
     }
 }
@@ -137,7 +139,8 @@ fn diagnostic_json(diagnostic: &Diagnostic, sources: &SourceMap) -> Value {
         let file = sources.file(span.file).map_or("", |f| f.name());
         json!({ "file": file, "line": at.line, "column": at.column, "end_line": end.line, "end_column": end.column })
     };
-    let labels: Vec<Value> = diagnostic.labels.iter().map(|(span, text)| json!({ "place": place(*span), "text": text })).collect();
+    let labels: Vec<Value> =
+        diagnostic.labels.iter().map(|(span, text)| json!({ "place": place(*span), "text": text })).collect();
     json!({
         "code": diagnostic.code(),
         "severity": diagnostic.severity.word(),

@@ -26,5 +26,9 @@ pub fn report_fault(fault: &FaultReport, context: &FaultContext<'_>, format: For
         result(&report.to_json());
     }
     people(&format!("{report}"));
-    people(&format!("  in round {}, at {:.6} s; its outputs were not written", fault.rounds + 1, fault.time.0 as f64 / 1e9));
+    people(&format!(
+        "  in round {}, at {:.6} s; its outputs were not written",
+        fault.rounds + 1,
+        fault.time.0 as f64 / 1e9
+    ));
 }

@@ -2,13 +2,14 @@
 
 use std::path::Path;
 
-use kilohertz::pipeline::EngineKind;
 use khz_machine::image::Image;
 use khz_scheduler::time::DurationNs;
 use khz_scheduler::{
-    Clock, Faulted, Hooks, HostOptions, HostReport, InputSource, MonotonicClock, NoInputs, NoIo, Resource, RunOptions, RunOutcome,
-    StatisticsReport, StopHandle, Stopped, VirtualClock, on_scan_thread, run as run_rounds, stop_on_signals,
+    Clock, Faulted, Hooks, HostOptions, HostReport, InputSource, MonotonicClock, NoInputs, NoIo, Resource, RunOptions,
+    RunOutcome, StatisticsReport, StopHandle, Stopped, VirtualClock, on_scan_thread, run as run_rounds,
+    stop_on_signals,
 };
+use kilohertz::pipeline::EngineKind;
 
 use super::args::{ClockArg, EngineArg, Format, RunArgs};
 use super::output::{Failure, choose, load, people, print_diagnostics, write_file};
@@ -27,7 +28,8 @@ pub fn run(args: &RunArgs) -> Outcome {
     let session = Session::new(program, &args.resource);
     let stop = StopHandle::new();
     stop_on_signals(&stop).map_err(|error| Failure::Message(Status::Host, format!("signal handlers: {error}")))?;
-    let host = HostOptions { real_time_priority: args.rt, cpu: args.cpu.map(|cpu| cpu as usize), ..HostOptions::default() };
+    let host =
+        HostOptions { real_time_priority: args.rt, cpu: args.cpu.map(|cpu| cpu as usize), ..HostOptions::default() };
     let outcome = on_scan_thread(&host, |report| run_on_scan_thread(args, &session, stop, &report));
     outcome.map_err(|error| Failure::Message(Status::Host, format!("no thread to scan on: {error}")))?
 }
@@ -51,7 +53,8 @@ fn run_on_scan_thread(args: &RunArgs, session: &Session<'_>, stop: StopHandle, h
     };
     let mut rows = session.inputs(resource.image())?;
     let trace = args.trace.as_deref().map(|path| (path, args.watch.as_slice()));
-    let mut onlooker = Onlooker::new(trace, &session.names, args.common.format == Format::Human && args.clock == ClockArg::Real)?;
+    let mut onlooker =
+        Onlooker::new(trace, &session.names, args.common.format == Format::Human && args.clock == ClockArg::Real)?;
     let running = match resource.start() {
         Ok(running) => running,
         Err(faulted) => return end_faulted(args, session, &faulted),
@@ -91,7 +94,12 @@ fn end_faulted(args: &RunArgs, session: &Session<'_>, faulted: &Resource<Faulted
 }
 
 /// The dump and the statistics, also after a trap.
-fn write_results(args: &RunArgs, session: &Session<'_>, image: &Image, statistics: &StatisticsReport) -> Result<(), Failure> {
+fn write_results(
+    args: &RunArgs,
+    session: &Session<'_>,
+    image: &Image,
+    statistics: &StatisticsReport,
+) -> Result<(), Failure> {
     if let Some(path) = &args.dump_vars {
         let text = if is_json(path) {
             session.names.dump_json(image, statistics.time.as_us(), statistics.rounds)
@@ -101,7 +109,8 @@ fn write_results(args: &RunArgs, session: &Session<'_>, image: &Image, statistic
         write_file(path, text.as_bytes())?;
     }
     if let Some(path) = &args.stats {
-        let names = session.program.container().debug.as_ref().map(|debug| debug.task_names.clone()).unwrap_or_default();
+        let names =
+            session.program.container().debug.as_ref().map(|debug| debug.task_names.clone()).unwrap_or_default();
         write_file(path, statistics.to_json(&names).as_bytes())?;
     }
     Ok(())
@@ -115,10 +124,16 @@ fn is_json(path: &Path) -> bool {
 fn summary(statistics: &StatisticsReport, session: &Session<'_>) {
     let debug = session.program.container().debug.as_ref();
     for (position, task) in statistics.tasks.iter().enumerate() {
-        let name = debug.and_then(|debug| debug.task_names.get(position)).map_or_else(|| format!("task {}", task.id), Clone::clone);
-        let mut line = format!("  {name}: {} scans, {} overruns, {} cycles lost", task.scans, task.overruns, task.lost_cycles);
+        let name = debug
+            .and_then(|debug| debug.task_names.get(position))
+            .map_or_else(|| format!("task {}", task.id), Clone::clone);
+        let mut line =
+            format!("  {name}: {} scans, {} overruns, {} cycles lost", task.scans, task.overruns, task.lost_cycles);
         if let Some(execution) = &task.execution {
-            line += &format!(", execution {} / {} / {} ns (min, average, max)", execution.min, execution.average, execution.max);
+            line += &format!(
+                ", execution {} / {} / {} ns (min, average, max)",
+                execution.min, execution.average, execution.max
+            );
         }
         if let Some(jitter) = &task.jitter {
             line += &format!(", start jitter {} / {} ns (average, max)", jitter.average, jitter.max);

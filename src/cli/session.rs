@@ -2,15 +2,17 @@
 
 use std::sync::Arc;
 
-use kilohertz::pipeline::{EngineKind, Program};
 use khz_machine::image::Image;
 use khz_machine::variables::VariableTable;
-use khz_scheduler::{Clock, Faulted, HoldsContainer, LoadError, LoadOptions, Resource, StopHandle, Stopped, VirtualClock};
+use khz_scheduler::{
+    Clock, Faulted, HoldsContainer, LoadError, LoadOptions, Resource, StopHandle, Stopped, VirtualClock,
+};
+use kilohertz::pipeline::{EngineKind, Program};
 
+use super::Status;
 use super::args::ResourceArgs;
 use super::inputs::{CsvInputs, set_values};
 use super::output::Failure;
-use super::Status;
 
 /// A program and what the command line gives it.
 pub struct Session<'a> {
@@ -41,12 +43,20 @@ impl<'a> Session<'a> {
     pub fn needs_fuel(&self) -> bool {
         let container = self.program.container();
         let has_watchdog = self.args.watchdog_us > 0 || container.tasks.tasks.iter().any(|task| task.watchdog_us > 0);
-        let starts_with_code = container.parameters.init_function.is_some() || container.parameters.startup_function.is_some();
+        let starts_with_code =
+            container.parameters.init_function.is_some() || container.parameters.startup_function.is_some();
         has_watchdog || starts_with_code
     }
 
     /// Loads the resource with an engine and a clock, and applies `--set`.
-    pub fn open(&self, kind: EngineKind, clock: Box<dyn Clock>, fuel: bool, stop: Option<StopHandle>, rt: Option<u8>) -> Result<Opened, Failure> {
+    pub fn open(
+        &self,
+        kind: EngineKind,
+        clock: Box<dyn Clock>,
+        fuel: bool,
+        stop: Option<StopHandle>,
+        rt: Option<u8>,
+    ) -> Result<Opened, Failure> {
         let layout = self.program.layout(self.args.max_image).map_err(Failure::refused)?;
         let engine = self.program.engine(kind, &layout, fuel).map_err(Failure::refused)?;
         let options = LoadOptions {

@@ -9,7 +9,10 @@ pub struct Stopwatch(Instant);
 impl Stopwatch {
     /// Starts now.
     pub fn start() -> Self {
-        #[expect(clippy::disallowed_methods, reason = "figures about the host: what a compilation or a batch of scans took")]
+        #[expect(
+            clippy::disallowed_methods,
+            reason = "figures about the host: what a compilation or a batch of scans took"
+        )]
         let now = Instant::now();
         Stopwatch(now)
     }

@@ -8,8 +8,8 @@ use khz_machine::image::Image;
 use khz_machine::variables::{Variable, VariableTable};
 use khz_scheduler::{Observer, TaskIndex, TimeNs};
 
-use super::output::Failure;
 use super::Status;
+use super::output::Failure;
 use super::stopwatch::Stopwatch;
 
 /// How often the status line is drawn anew, in nanoseconds.
@@ -60,7 +60,8 @@ impl Onlooker {
 impl Trace {
     fn create(path: &Path, watch: &[String], names: &VariableTable) -> Result<Self, Failure> {
         let watched = watch.iter().map(|name| names.resolve(name.trim()));
-        let watched: Vec<Variable> = watched.collect::<Result<_, _>>().map_err(|error| Failure::refused(format!("--watch: {error}")))?;
+        let watched: Vec<Variable> =
+            watched.collect::<Result<_, _>>().map_err(|error| Failure::refused(format!("--watch: {error}")))?;
         let refused = |error: std::io::Error| Failure::Message(Status::Host, format!("{}: {error}", path.display()));
         let mut out = BufWriter::new(File::create(path).map_err(refused)?);
         let header: Vec<&str> = std::iter::once("time_us").chain(watched.iter().map(|v| v.name.as_str())).collect();
@@ -96,7 +97,12 @@ impl StatusLine {
         }
         let seconds = time.as_us() as f64 / 1e6;
         // The line is people's only; a closed terminal does not matter.
-        let _ = write!(std::io::stderr(), "\r\x1b[K{seconds:9.3} s  {} rounds  {} task cycles  (Ctrl+C stops)", self.rounds, self.cycles);
+        let _ = write!(
+            std::io::stderr(),
+            "\r\x1b[K{seconds:9.3} s  {} rounds  {} task cycles  (Ctrl+C stops)",
+            self.rounds,
+            self.cycles
+        );
         self.since_drawn = Stopwatch::start();
     }
 }

@@ -37,8 +37,14 @@ fn print(program: &Program, format: Format) -> Result<(), Failure> {
         return Ok(());
     }
     people(&format!("RESOURCE {}: verified", program.name));
-    people(&format!("  {} functions, {instructions} instructions; every operand typed on every path, no instruction unreachable", facts.functions.len()));
-    people(&format!("  {} loops, all reducible; {for_loops} FOR loops, of {proven} the control variable is proven", loops().count()));
+    people(&format!(
+        "  {} functions, {instructions} instructions; every operand typed on every path, no instruction unreachable",
+        facts.functions.len()
+    ));
+    people(&format!(
+        "  {} loops, all reducible; {for_loops} FOR loops, of {proven} the control variable is proven",
+        loops().count()
+    ));
     people(&format!("  {} tasks, {} program instances", tasks.tasks.len(), tasks.instances.len()));
     people(&format!(
         "  memory image {} bytes: slots {}, data {}, frames {frames}, %M {}, %Q {}, %I {}",

@@ -56,7 +56,9 @@ pub fn jitter_page(statistics: &StatisticsReport, names: &[String]) -> String {
 }
 
 fn head(title: &str, heading: &str) -> String {
-    format!("<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><title>{title}</title><style>{STYLE}</style></head><body><h1>{heading}</h1>")
+    format!(
+        "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><title>{title}</title><style>{STYLE}</style></head><body><h1>{heading}</h1>"
+    )
 }
 
 fn escaped(text: &str) -> String {
@@ -78,7 +80,18 @@ fn histogram(out: &mut String, batches: &[f64]) {
     let bar_width = WIDTH / BARS;
     for (at, count) in bars.iter().enumerate() {
         let height = count * HEIGHT / most;
-        let _ = write!(out, "<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{height}\"><title>{count} batches near {:.1} ns</title></rect>", at * bar_width, HEIGHT - height, bar_width - 1, low + width * (at as f64 + 0.5));
+        let _ = write!(
+            out,
+            "<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{height}\"><title>{count} batches near {:.1} ns</title></rect>",
+            at * bar_width,
+            HEIGHT - height,
+            bar_width - 1,
+            low + width * (at as f64 + 0.5)
+        );
     }
-    let _ = write!(out, "<text x=\"0\" y=\"{0}\">{low:.1} ns</text><text x=\"{WIDTH}\" y=\"{0}\" text-anchor=\"end\">{high:.1} ns</text></svg>", HEIGHT + 15);
+    let _ = write!(
+        out,
+        "<text x=\"0\" y=\"{0}\">{low:.1} ns</text><text x=\"{WIDTH}\" y=\"{0}\" text-anchor=\"end\">{high:.1} ns</text></svg>",
+        HEIGHT + 15
+    );
 }

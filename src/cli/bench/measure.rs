@@ -63,7 +63,11 @@ pub fn measure(resource: Resource<Running>, scans: Option<u64>) -> Result<Measur
         }
         median = now;
     }
-    Ok(Measured { scans: per_batch * state.batches.len() as u64, distribution: distribution(&state.batches), batches: state.batches })
+    Ok(Measured {
+        scans: per_batch * state.batches.len() as u64,
+        distribution: distribution(&state.batches),
+        batches: state.batches,
+    })
 }
 
 struct State {
@@ -93,7 +97,9 @@ impl State {
 fn distribution(batches: &[f64]) -> Distribution {
     let mut sorted = batches.to_vec();
     sorted.sort_by(f64::total_cmp);
-    let rank = |share: f64| sorted.get(((sorted.len() as f64 * share).ceil() as usize).saturating_sub(1)).copied().unwrap_or_default();
+    let rank = |share: f64| {
+        sorted.get(((sorted.len() as f64 * share).ceil() as usize).saturating_sub(1)).copied().unwrap_or_default()
+    };
     let mean = sorted.iter().sum::<f64>() / sorted.len().max(1) as f64;
     Distribution { min: rank(0.0), median: rank(0.5), p99: rank(0.99), p999: rank(0.999), max: rank(1.0), mean }
 }
