@@ -105,3 +105,48 @@ fn no_unreachable_code_is_emitted() {
         verified(&format!("PROGRAM p\nVAR\n  a : INT;\n  i : INT;\n  b : BOOL;\nEND_VAR\n  {body}\nEND_PROGRAM\n"));
     }
 }
+
+/// Splits a text into words with what stands behind each.
+fn words(text: &str) -> Vec<String> {
+    text.split_inclusive(|c: char| !c.is_alphanumeric() && c != '_').map(str::to_owned).collect()
+}
+
+#[test]
+fn of_changed_sources_none_panics_and_what_compiles_verifies() {
+    let mut texts = vec![include_str!("programs/tour.st").to_owned()];
+    texts.extend(
+        semantic::TABLE.iter().chain(types::TABLE).flat_map(|rule| [rule.wrong, rule.right]).map(str::to_owned),
+    );
+    let pool: Vec<String> = texts.iter().flat_map(|text| words(text)).collect();
+    let mut state: u64 = 0x9E37_79B9_7F4A_7C15;
+    let mut pick = |below: usize| {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        usize::try_from(state % below.max(1) as u64).unwrap_or(0)
+    };
+    let mut compiled_count = 0;
+    for _ in 0..600 {
+        let which = pick(texts.len() + 20).saturating_sub(20);
+        let mut list = words(&texts[which]);
+        for _ in 0..=pick(2) {
+            if list.is_empty() {
+                break;
+            }
+            let (at, other) = (pick(list.len()), pick(pool.len()));
+            match pick(3) {
+                0 => drop(list.remove(at)),
+                1 => list[at].clone_from(&pool[other]),
+                _ => list.insert(at, pool[other].clone()),
+            }
+        }
+        let text = list.concat();
+        for resource in compiled(&text).resources {
+            compiled_count += 1;
+            if let Err(error) = verify(resource.container) {
+                panic!("{error}\n{text}");
+            }
+        }
+    }
+    assert!(compiled_count > 30, "only {compiled_count} changed sources still compile: the test tests little");
+}

@@ -149,7 +149,7 @@ impl<'a> Checker<'_, 'a> {
         }
     }
 
-    fn bind(&mut self, info: &PouInfo, args: &'a [Arg], span: Span) -> Option<Bound<'a>> {
+    fn bind(&mut self, info: &PouInfo, args: &'a [Arg]) -> Option<Bound<'a>> {
         let mut bound = Bound::default();
         let mut sound = true;
         let parameters: Vec<(VarId, &VarInfo)> = (0u32..)
@@ -214,7 +214,6 @@ impl<'a> Checker<'_, 'a> {
                 (Some(_), _, None) => {}
             }
         }
-        let _ = span;
         sound.then_some(bound)
     }
 
@@ -231,7 +230,7 @@ impl<'a> Checker<'_, 'a> {
     fn function_call(&mut self, pou: PouId, args: &'a [Arg], span: Span) -> Option<Call> {
         let info = self.an.info(pou)?;
         self.note_callee(pou, span);
-        let Some(bound) = self.bind(&info, args, span) else {
+        let Some(bound) = self.bind(&info, args) else {
             self.check_loose(args);
             return None;
         };
@@ -384,7 +383,7 @@ impl<'a> Checker<'_, 'a> {
     fn block_call(&mut self, instance: Place, ty: TyId, pou: PouId, args: &'a [Arg], span: Span) -> Option<Call> {
         let info = self.an.resolve_pou(pou)?;
         self.note_callee(pou, span);
-        let Some(bound) = self.bind(&info, args, span) else {
+        let Some(bound) = self.bind(&info, args) else {
             self.check_loose(args);
             return None;
         };

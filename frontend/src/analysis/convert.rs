@@ -302,7 +302,7 @@ impl Checker<'_, '_> {
             return Some((a, b, Ty::Str(n.max(m))));
         }
         let (a, b) = match (is_literal(a.ty), is_literal(b.ty)) {
-            (true, true) => return self.unify_literals(a, b, want),
+            (true, true) => return Self::unify_literals(a, b),
             (true, false) => (self.adapt(&a, b.ty, want)?, b),
             (false, true) => {
                 let adapted = self.adapt(&b, a.ty, want)?;
@@ -325,7 +325,7 @@ impl Checker<'_, '_> {
         Some((a, b, Ty::Elem(meet)))
     }
 
-    fn unify_literals(&mut self, a: Expr, b: Expr, want: Ty) -> Option<(Expr, Expr, Ty)> {
+    fn unify_literals(a: Expr, b: Expr) -> Option<(Expr, Expr, Ty)> {
         if a.ty == b.ty {
             let ty = a.ty;
             return Some((a, b, ty));
@@ -338,7 +338,6 @@ impl Checker<'_, '_> {
             }
             _ => expr,
         };
-        let _ = want;
         Some((real(a), real(b), Ty::RealLit))
     }
 

@@ -250,7 +250,7 @@ impl<'a> Analyzer<'a> {
             vars.push(new_var(&pou.name, self.spelling(&pou.name), ty, VarClass::Result, init));
         }
         for section in &pou.sections {
-            let class = self.var_class(section, pou.kind);
+            let class = self.var_class(section);
             for decl in &section.decls {
                 self.declare_vars(id, pou, section, decl, class, &mut vars, &mut names);
             }
@@ -265,7 +265,7 @@ impl<'a> Analyzer<'a> {
         PouInfo { kind: pou.kind, name: self.spelling(&pou.name).to_owned(), span: pou.name.span, vars, result, block }
     }
 
-    fn var_class(&mut self, section: &VarSection, kind: PouKind) -> VarClass {
+    fn var_class(&mut self, section: &VarSection) -> VarClass {
         match section.kind {
             VarKind::Local => VarClass::Local,
             VarKind::Input => VarClass::Input,
@@ -274,7 +274,6 @@ impl<'a> Analyzer<'a> {
             VarKind::Temp => VarClass::Temp,
             VarKind::External => VarClass::External,
             VarKind::Global => {
-                let _ = kind;
                 self.report(&rules::NOT_SUPPORTED, section.span, "VAR_GLOBAL stands outside of programs and functions");
                 VarClass::Local
             }

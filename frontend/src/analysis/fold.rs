@@ -4,7 +4,7 @@
 use khz_bytecode::container::ElementaryType as E;
 
 use super::tree::{BinOp, UnOp};
-use super::types::{Const, integer_type, is_duration, is_real, is_signed, limits, widen, wrap};
+use super::types::{Const, integer_type, is_duration, is_real, limits, widen, wrap};
 
 /// Nanoseconds in a millisecond, the unit in which TIME meets numbers.
 pub(crate) const NS_PER_MS: i64 = 1_000_000;
@@ -177,7 +177,6 @@ fn float_to_integer(value: f64, to: E, truncates: bool) -> Option<Const> {
         return None;
     }
     let (low, high) = limits(to)?;
-    let _ = is_signed(to);
     let rounded = if truncates { value.trunc() } else { value.round_ties_even() };
     #[expect(clippy::cast_possible_truncation, reason = "the cast saturates and NaN gives 0, as the language says")]
     let number = (rounded as i128).clamp(low, high);

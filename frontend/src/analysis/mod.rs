@@ -49,6 +49,9 @@ pub fn analyze(ast: &Ast, dialect: Dialect, standard: Option<FileId>) -> (Projec
     (Project { types: analyzer.types, pous, globals: analyzer.globals, resources }, analyzer.diagnostics)
 }
 
+/// For how many unknown names a known one is looked for that may have been meant.
+const MAX_SUGGESTIONS: u32 = 100;
+
 /// How far a definition is.
 #[derive(Debug, Clone)]
 enum State<T> {
@@ -100,6 +103,7 @@ struct Analyzer<'a> {
     global_names: BTreeMap<Symbol, Vec<GlobalId>>,
     global_decls: Vec<GlobalDecl<'a>>,
     depth: u32,
+    suggestions: u32,
 }
 
 /// A global as declared.
@@ -132,6 +136,7 @@ impl<'a> Analyzer<'a> {
             global_names: BTreeMap::new(),
             global_decls: Vec::new(),
             depth: 0,
+            suggestions: 0,
         }
     }
 
@@ -193,6 +198,9 @@ impl<'a> Analyzer<'a> {
             return;
         }
         let wanted = self.text(ident.symbol);
+        // Looking through all names for each of very many unknown ones would take time in their product.
+        self.suggestions += 1;
+        let known = known.take(if self.suggestions <= MAX_SUGGESTIONS { usize::MAX } else { 0 });
         let mut best: Option<(usize, &str)> = None;
         for symbol in known {
             let name = self.text(symbol);

@@ -136,8 +136,7 @@ impl<'a> Checker<'_, 'a> {
         };
         self.note_use(root, span);
         let ty = self.root_type(root);
-        if let (Root::Global(global), Some(located)) = (root, self.root_location(root)) {
-            let _ = global;
+        if let (Root::Global(_), Some(located)) = (root, self.root_location(root)) {
             self.note_image(located, self.an.types.extent(ty).0);
         }
         if ty == Ty::Error || self.external_differs(name.symbol, ty) {

@@ -48,7 +48,7 @@ impl<'a> Analyzer<'a> {
                 length.as_ref().map_or(Ty::Str(DEFAULT_STRING_LENGTH), |length| self.string_type(length, scope))
             }
             TypeSpecKind::Subrange { base, range } => self.subrange_type(base, range, scope),
-            TypeSpecKind::Enum { base, values } => self.enum_type(base.as_ref(), values, scope, name, spec.span),
+            TypeSpecKind::Enum { base, values } => self.enum_type(base.as_ref(), values, scope, name),
             TypeSpecKind::Array { dims, element } => self.array_type(dims, element, scope, spec.span),
             TypeSpecKind::Struct { union: true, .. } => self.not_yet(spec.span, "UNION"),
             TypeSpecKind::Struct { union: false, fields } => self.struct_type(fields, scope, name, spec.span),
@@ -204,7 +204,6 @@ impl<'a> Analyzer<'a> {
         values: &'a [EnumValue],
         scope: Option<PouId>,
         name: Option<&Ident>,
-        span: Span,
     ) -> Ty {
         let elementary = match base {
             Some(base) => match self.integer_base(base) {
@@ -237,7 +236,6 @@ impl<'a> Analyzer<'a> {
             list.push((value.name.symbol, self.spelling(&value.name).to_owned(), wrap(elementary, next)));
             next += 1;
         }
-        let _ = span;
         let first = list.first().map_or(0, |value| value.2);
         let symbols: Vec<Symbol> = list.iter().map(|value| value.0).collect();
         let bytes = elementary.storage().bytes();

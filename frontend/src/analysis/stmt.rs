@@ -151,8 +151,7 @@ impl<'a> Checker<'_, 'a> {
         all.sort_by_key(|(low, high, span)| (*low, *high, span.start));
         let mut widest: Option<(i128, Span)> = None;
         for (low, high, span) in all {
-            if let Some((end, first)) = widest.filter(|(end, _)| low <= *end) {
-                let _ = end;
+            if let Some((_, first)) = widest.filter(|(end, _)| low <= *end) {
                 let found = Diagnostic::new(&names::CASE_OVERLAP, span, format!("{low} is selected twice"));
                 self.an.push(found.label(first, "first here"));
             }

@@ -15,8 +15,7 @@ impl FunctionBuilder<'_, '_> {
             self.block_call(call);
             return;
         }
-        if let Some(ty) = self.function_call(call) {
-            let _ = ty;
+        if self.function_call(call).is_some() {
             self.e.push(I::Drop {}, 1, 0);
         }
     }

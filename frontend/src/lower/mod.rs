@@ -109,7 +109,7 @@ pub(crate) fn lower(
     let mut builder = Builder::new(project, plan);
     builder.plan_memory(names);
     builder.lower_units();
-    let mut container = builder.finish(names, sources, hashes);
+    let mut container = builder.finish(sources, hashes);
     if strip {
         container.debug = None;
     }

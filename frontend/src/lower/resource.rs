@@ -16,7 +16,6 @@ use super::{Builder, Hashes};
 use crate::analysis::tree::{InstancePlan, PouInfo, SinglePlan, VarClass, VarId};
 use crate::analysis::types::{Ty, Value};
 use crate::source::SourceMap;
-use crate::syntax::symbol::Interner;
 
 /// Where one program instance's variables start.
 #[derive(Debug, Clone, Copy, Default)]
@@ -27,7 +26,7 @@ struct Base {
 
 impl Builder<'_> {
     /// Puts everything together.
-    pub(super) fn finish(&mut self, names: &Interner, sources: &SourceMap, hashes: &Hashes) -> Container {
+    pub(super) fn finish(&mut self, sources: &SourceMap, hashes: &Hashes) -> Container {
         let plan = self.plan;
         let shared_globals = self.id16(self.section.slots.len(), "slots");
         let mut bases = Vec::with_capacity(plan.instances.len());
@@ -47,7 +46,7 @@ impl Builder<'_> {
         self.retained(&bases);
         let tasks = plan.tasks.iter().enumerate().map(|(at, task)| self.task(at, task, &bases)).collect::<Vec<_>>();
         self.section.task_extensions = tasks.iter().map(|(_, extension)| *extension).collect();
-        let debug = self.debug(names, sources, hashes, &bases);
+        let debug = self.debug(sources, hashes, &bases);
         let parameters = self.parameters(&instances, startup_function);
         Container {
             parameters,
@@ -379,9 +378,8 @@ impl Builder<'_> {
         u32::try_from(total).unwrap_or(u32::MAX)
     }
 
-    fn debug(&mut self, names: &Interner, sources: &SourceMap, hashes: &Hashes, bases: &[Base]) -> DebugSection {
+    fn debug(&mut self, sources: &SourceMap, hashes: &Hashes, bases: &[Base]) -> DebugSection {
         let plan = self.plan;
-        let _ = names;
         let files: Vec<SourceFile> = sources
             .files()
             .map(|(id, file)| SourceFile {
