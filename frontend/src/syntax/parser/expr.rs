@@ -287,6 +287,13 @@ impl Parser<'_> {
                 let name = self.take_name();
                 self.expr_node(0, name.span, ExprKind::Name(name))
             }
+            // `AND(a, b)`: these operators are standard functions too (tables 29 and 31).
+            TokenKind::Keyword(Keyword::And | Keyword::Or | Keyword::Xor | Keyword::Mod)
+                if self.kind_at(1) == TokenKind::LeftParen =>
+            {
+                let name = self.take_name();
+                self.expr_node(0, name.span, ExprKind::Name(name))
+            }
             TokenKind::LeftParen => self.parenthesised(),
             TokenKind::Direct | TokenKind::MalformedDirect => {
                 let address = self.direct_address();
