@@ -156,4 +156,9 @@ rules! {
         wrong "PROGRAM p\nVAR RETAIN NON_RETAIN\n  x : INT;\nEND_VAR\nEND_PROGRAM\n"
         right "PROGRAM p\nVAR RETAIN\n  x : INT;\nEND_VAR\nEND_PROGRAM\n"
     }
+    BAD_TEST = "P0031" Error "a test file that cannot be read so" {
+        "A test has a name, and a file has at most one SETUP and one TEARDOWN, which hold for all of its tests in blocks."
+        wrong "PROGRAM p\nEND_PROGRAM\nTEST ''\n  ASSERT_TRUE(TRUE);\nEND_TEST\n"
+        right "PROGRAM p\nEND_PROGRAM\nTEST 'truth is true'\n  ASSERT_TRUE(TRUE);\nEND_TEST\n"
+    }
 }

@@ -13,6 +13,7 @@
 mod config;
 mod expr;
 mod stmt;
+mod test;
 mod types;
 mod vars;
 
@@ -21,6 +22,7 @@ pub use config::{
 };
 pub use expr::{Arg, ArgKind, BinaryOp, Expr, ExprKind, Literal, LiteralValue, UnaryOp};
 pub use stmt::{Block, CaseArm, CaseLabel, IfBranch, Stmt, StmtKind};
+pub use test::{Test, TestPart, TestSuite};
 pub use types::{
     ArrayDim, EnumValue, Init, InitElement, InitField, InitKind, Range, ReferenceKind, TypeDecl, TypeSpec, TypeSpecKind,
 };
@@ -54,6 +56,8 @@ pub struct SourceUnit {
     pub file: FileId,
     /// What it declares, in order.
     pub declarations: Vec<Declaration>,
+    /// Its unit tests.
+    pub tests: TestSuite,
     /// Pragmas that are no attributes, or that stand where no declaration follows; they have no meaning of their own.
     pub pragmas: Vec<Pragma>,
 }

@@ -18,10 +18,11 @@ mod pou;
 mod pragma;
 mod spelling;
 mod stmt;
+mod test;
 mod types;
 mod vars;
 
-use super::ast::{Ast, Expr, ExprId, ExprKind, Ident, Pragma, SourceUnit, VarSection};
+use super::ast::{Ast, Expr, ExprId, ExprKind, Ident, Pragma, SourceUnit, TestSuite, VarSection};
 use super::keyword::Keyword;
 use super::lexer::{Token, TokenKind, lex};
 use super::symbol::{Interner, Symbol};
@@ -93,6 +94,10 @@ struct Parser<'a> {
     open: OpenBlocks,
     /// Variable sections found among the statements of the current POU.
     late_sections: Vec<VarSection>,
+    /// Whether the current statements are a test's.
+    in_test: bool,
+    /// The tests of the file so far.
+    suite: TestSuite,
 }
 
 impl<'a> Parser<'a> {
@@ -121,6 +126,8 @@ impl<'a> Parser<'a> {
             nesting: 0,
             open: OpenBlocks::default(),
             late_sections: Vec::new(),
+            in_test: false,
+            suite: TestSuite::default(),
         };
         parser.take_tokens();
         parser
@@ -425,7 +432,8 @@ impl<'a> Parser<'a> {
     fn source_unit(&mut self) -> SourceUnit {
         let declarations = self.declarations();
         self.finish_pragmas();
-        SourceUnit { file: self.file, declarations, pragmas: std::mem::take(&mut self.loose_pragmas) }
+        let tests = std::mem::take(&mut self.suite);
+        SourceUnit { file: self.file, declarations, tests, pragmas: std::mem::take(&mut self.loose_pragmas) }
     }
 }
 

@@ -36,7 +36,7 @@ impl PouKind {
 
 impl Parser<'_> {
     /// ```text
-    /// declaration = type-block | pou | global-variables | configuration
+    /// declaration = type-block | pou | global-variables | configuration | test
     /// ```
     pub(super) fn declarations(&mut self) -> Vec<Declaration> {
         let mut declarations = Vec::new();
@@ -70,7 +70,9 @@ impl Parser<'_> {
                 }
                 _ => {
                     self.drop_attributes(attributes);
-                    self.no_declaration();
+                    if !self.test_declaration() {
+                        self.no_declaration();
+                    }
                 }
             }
         }
@@ -91,6 +93,7 @@ impl Parser<'_> {
                 // A lost CONFIGURATION leaves its program instances behind.
                 TokenKind::Keyword(Keyword::Program) if self.at_program_instance() => {}
                 TokenKind::Keyword(word) if word.starts_declaration() || word == Keyword::VarGlobal => return,
+                TokenKind::Ident if self.on_new_line() && self.at_test_declaration() => return,
                 _ => {}
             }
         }
@@ -145,7 +148,7 @@ impl Parser<'_> {
         }
     }
 
-    fn sections(&mut self) -> Vec<VarSection> {
+    pub(super) fn sections(&mut self) -> Vec<VarSection> {
         let mut sections = Vec::new();
         loop {
             let attributes = self.attributes();

@@ -42,7 +42,7 @@ impl Parser<'_> {
                     || (word.starts_declaration() && !self.on_same_line_as_statement())
                     || matches!(word, Keyword::VarGlobal)
             }
-            _ => self.open.cases > 0 && self.at_case_label(),
+            _ => self.at_test_end() || (self.open.cases > 0 && self.at_case_label()),
         }
     }
 
@@ -146,6 +146,7 @@ impl Parser<'_> {
             TokenKind::Keyword(Keyword::Exit) => self.jump(StmtKind::Exit),
             TokenKind::Keyword(Keyword::Continue) => self.jump(StmtKind::Continue),
             TokenKind::Keyword(Keyword::Return) => self.jump(StmtKind::Return),
+            TokenKind::Ident if self.at_mock() => self.mock_statement(),
             TokenKind::Ident | TokenKind::Direct | TokenKind::MalformedDirect => self.simple_statement(),
             _ => {
                 self.report_expected("a statement");
@@ -202,6 +203,7 @@ impl Parser<'_> {
                     return;
                 }
                 TokenKind::End => return,
+                TokenKind::Ident if self.at_test_end() => return,
                 TokenKind::Keyword(word)
                     if word.starts_statement()
                         || word.starts_section()
