@@ -19,6 +19,8 @@ pub(super) struct Writer<'a> {
     column: usize,
     /// The indentation of the current line of text.
     indent: usize,
+    /// Nothing stands on the current line of text yet.
+    fresh: bool,
 }
 
 /// A bracket that is open, or the line itself.
@@ -37,7 +39,7 @@ impl<'a> Writer<'a> {
     /// An empty text.
     pub fn new(scanned: &'a Scanned<'a>, options: FormatOptions) -> Self {
         let out = String::with_capacity(scanned.text.len() + scanned.text.len() / 4);
-        Self { scanned, options, out, column: 0, indent: 0 }
+        Self { scanned, options, out, column: 0, indent: 0, fresh: true }
     }
 
     /// All that was written.
@@ -68,6 +70,7 @@ impl<'a> Writer<'a> {
         self.out.extend(std::iter::repeat_n(' ', indent));
         self.column = indent;
         self.indent = indent;
+        self.fresh = true;
     }
 
     /// Goes to a new line of text before a piece; a blank line before it is kept.
@@ -80,10 +83,11 @@ impl<'a> Writer<'a> {
     }
 
     fn piece(&mut self, piece: &Piece<'_>) {
-        if piece.space && self.column > self.indent {
+        if piece.space && !std::mem::take(&mut self.fresh) {
             self.out.push(' ');
             self.column += 1;
         }
+        self.fresh = false;
         if !piece.kind.is_trivia() {
             self.out.push_str(&piece.text);
             self.column += piece.text.chars().count();

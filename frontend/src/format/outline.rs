@@ -1,6 +1,6 @@
 //! What only the tree knows about the tokens.
 
-use crate::syntax::ast::{Ast, Block, Configuration, Declaration, Ident, Pou, StmtKind};
+use crate::syntax::ast::{Ast, Block, Configuration, Declaration, Ident, Pou, StmtKind, TestSuite};
 
 /// Places that lines begin or end at, by offset.
 #[derive(Default)]
@@ -22,6 +22,9 @@ impl Outline {
                 Declaration::Type(_) | Declaration::Globals(_) => {}
             }
         }
+        for file in &ast.files {
+            outline.tests(&file.tests);
+        }
         outline.head_ends.sort_unstable();
         outline.arms.sort_unstable();
         outline
@@ -41,6 +44,17 @@ impl Outline {
     fn pou(&mut self, pou: &Pou) {
         self.head_ends.push(pou.result.as_ref().map_or(pou.name.span.end, |result| result.span.end));
         self.blocks(&pou.body);
+    }
+
+    /// The heads of tests are their name or, of SETUP and TEARDOWN, their word, which the tree does not place.
+    fn tests(&mut self, tests: &TestSuite) {
+        for test in &tests.tests {
+            self.head_ends.push(test.name_span.end);
+            self.blocks(&test.part.body);
+        }
+        for part in tests.setup.iter().chain(&tests.teardown) {
+            self.blocks(&part.body);
+        }
     }
 
     fn configuration(&mut self, configuration: &Configuration) {

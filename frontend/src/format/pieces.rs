@@ -117,6 +117,7 @@ fn is_word_of_place(scanned: &Scanned<'_>, at: usize, line: &Line) -> bool {
     let after_name = before == Some(TokenKind::Ident);
     match line.kind {
         LineKind::SectionHead => true,
+        LineKind::TestHead | LineKind::TestEnd => before.is_none(),
         LineKind::ResourceHead => before.is_none() || is(&["ON"]),
         LineKind::Task => {
             before.is_none()

@@ -6,6 +6,15 @@ use crate::syntax::keyword::Keyword;
 use crate::syntax::lexer::TokenKind;
 use std::ops::Range;
 
+/// Words that begin a part of a test file at the top level, and the words that end it. Elsewhere they are names.
+const TEST_PARTS: [(&str, &str); 5] = [
+    ("TEST", "END_TEST"),
+    ("SETUP", "END_SETUP"),
+    ("TEARDOWN", "END_TEARDOWN"),
+    ("TEST_PROGRAM", "END_TEST_PROGRAM"),
+    ("TEST_FUNCTION_BLOCK", "END_TEST_FUNCTION_BLOCK"),
+];
+
 /// What a line is, as far as its spacing and its words depend on it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum LineKind {
@@ -19,6 +28,10 @@ pub(super) enum LineKind {
     Task,
     /// `PROGRAM name WITH task : type (…);` in a resource.
     ProgramInstance,
+    /// `TEST 'name'`, `SETUP`: the head of a part of a test file.
+    TestHead,
+    /// `END_TEST`, which is a reserved word here only.
+    TestEnd,
     /// `1, 3..5:`, perhaps with its statement behind it.
     CaseLabel,
 }
@@ -52,6 +65,8 @@ enum FrameKind {
     Resource,
     /// A program, function or function block: its variable sections are not indented.
     Pou,
+    /// A part of a test file, which a name ends: laid out like a program.
+    Test(&'static str),
     /// A CASE; what is in an arm stands one level deeper than the label, what is in its ELSE does not.
     Case { in_arm: bool },
     /// Everything else: sections, type blocks, structures, statements.
@@ -179,7 +194,7 @@ impl Splitter<'_> {
                 }
             }
             Some(word) if word.starts_section() => {
-                if top.is_some_and(|frame| frame.kind == FrameKind::Pou) {
+                if top.is_some_and(|frame| matches!(frame.kind, FrameKind::Pou | FrameKind::Test(_))) {
                     open.level = outer;
                 }
                 open.kind = LineKind::SectionHead;
@@ -187,6 +202,10 @@ impl Splitter<'_> {
             }
             Some(word) => self.begin_with(word, &mut open, top),
             None => self.begin_with_name(at, &mut open, top),
+        }
+        // The word that ends a test is a name to the lexer.
+        if open.kind == LineKind::TestEnd {
+            comments = Some(inner);
         }
         self.settle(comments.unwrap_or(open.level));
         self.open = Some(open);
@@ -220,6 +239,17 @@ impl Splitter<'_> {
             }
             Some(FrameKind::Configuration | FrameKind::Resource) if self.scanned.is_word(at, "TASK") => {
                 open.kind = LineKind::Task;
+            }
+            Some(FrameKind::Test(end)) if self.scanned.is_word(at, end) => {
+                open.kind = LineKind::TestEnd;
+                open.level = top.map_or(0, |frame| frame.level);
+                self.frames.pop();
+            }
+            None => {
+                if let Some((_, end)) = TEST_PARTS.iter().find(|(word, _)| self.scanned.is_word(at, word)) {
+                    open.kind = LineKind::TestHead;
+                    self.push(FrameKind::Test(end), open.level);
+                }
             }
             _ => self.begin_label(open, top),
         }
@@ -270,6 +300,12 @@ impl Splitter<'_> {
                 _ => self.ends_before(open, next),
             },
             _ => {
+                let setup = self.scanned.is_word(at, "SETUP") || self.scanned.is_word(at, "TEARDOWN");
+                if open.kind == LineKind::TestEnd
+                    || (open.kind == LineKind::TestHead && setup && open.first == Some(at))
+                {
+                    return next_kind != TokenKind::Semicolon;
+                }
                 let end = self.scanned.tokens.get(at).map_or(0, |token| token.end);
                 if self.outline.is_head_end(end) {
                     return next_kind != TokenKind::Semicolon;

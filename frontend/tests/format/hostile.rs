@@ -2,7 +2,7 @@
 
 #![expect(clippy::disallowed_methods, reason = "one of these tests measures how long hostile texts take")]
 
-use super::corpus::programs;
+use super::corpus::samples;
 use super::{check, parses};
 use khz_frontend::format::{FormatError, FormatOptions, format};
 use std::time::{Duration, Instant};
@@ -11,8 +11,8 @@ use std::time::{Duration, Instant};
 fn cut_at_every_byte() {
     let options = FormatOptions::default();
     // Every byte of the small files; of the large ones each byte comes up in a small one too, so every 41st is enough.
-    for (name, text) in &programs() {
-        let step = if text.len() < 800 { 1 } else { 41 };
+    for (name, text) in &samples() {
+        let step = if text.len() < 1000 { 1 } else { 41 };
         for end in (0..text.len()).step_by(step).filter(|&end| text.is_char_boundary(end)) {
             let cut = &text[..end];
             match format(cut, &options) {
