@@ -117,7 +117,10 @@ fn document() -> String {
         let _ = writeln!(out, "| {clause} | {what} |");
     }
     let total = run + refused + later;
-    let _ = writeln!(out, "\nTogether {total} programs: {run} that run, {refused} that are wrong and refused, {later} for what is not yet.");
+    let _ = writeln!(
+        out,
+        "\nTogether {total} programs: {run} that run, {refused} that are wrong and refused, {later} for what is not yet."
+    );
     out
 }
 
@@ -129,5 +132,8 @@ fn the_document_is_fresh() {
         std::fs::write(&path, &made).expect("docs/conformance.md");
     }
     let kept = std::fs::read_to_string(&path).unwrap_or_default();
-    assert!(kept == made, "docs/conformance.md is not what the programs say: KHZ_BLESS=1 cargo test --test conformance");
+    assert!(
+        kept == made,
+        "docs/conformance.md is not what the programs say: KHZ_BLESS=1 cargo test --test conformance"
+    );
 }

@@ -106,7 +106,9 @@ fn outcome(program: &Program, kind: EngineKind, want: &Expected) -> Result<Outco
 }
 
 fn trapped(faulted: &Resource<Faulted>, program: &Program) -> Result<Outcome, String> {
-    let FaultPlace::Task { instance, .. } = faulted.report().place else { return Err("a trap outside of tasks".into()) };
+    let FaultPlace::Task { instance, .. } = faulted.report().place else {
+        return Err("a trap outside of tasks".into());
+    };
     let report = TrapReport::new(&faulted.report().trap, Entry::Instance(instance), program.container());
     let source = report.place.source.as_ref().ok_or("a trap without a place")?;
     let values = report.values.iter().map(|(name, value)| format!("{name}={value}")).collect::<Vec<_>>().join(" ");
@@ -154,10 +156,10 @@ pub fn check(name: &str, text: &str) -> Vec<String> {
 
 fn refused(name: &str, want: &Expected, diagnostics: &[Diagnostic], sources: &SourceMap) -> Vec<String> {
     let errors = found(diagnostics, sources, Severity::Error);
-    if let (Some(wanted), [(code, place)]) = (&want.error, errors.as_slice()) {
-        if *wanted == format!("{code} {place}") || wanted == place {
-            return Vec::new();
-        }
+    if let (Some(wanted), [(code, place)]) = (&want.error, errors.as_slice())
+        && (*wanted == format!("{code} {place}") || wanted == place)
+    {
+        return Vec::new();
     }
     let shown = khz_frontend::diagnostics::render::render_all(diagnostics, sources, Default::default());
     match &want.error {
@@ -177,10 +179,10 @@ fn compare(name: &str, program: &Program, want: &Expected) -> Vec<String> {
             Err(error) => wrong.push(format!("{name} ({engine}): {error}")),
         }
     }
-    if let [(_, interp), (_, jit)] = outcomes.as_slice() {
-        if let Some(at) = interp.image.first_difference(&jit.image) {
-            wrong.push(format!("{name}: the images differ at {at}"));
-        }
+    if let [(_, interp), (_, jit)] = outcomes.as_slice()
+        && let Some(at) = interp.image.first_difference(&jit.image)
+    {
+        wrong.push(format!("{name}: the images differ at {at}"));
     }
     for (engine, found) in &outcomes {
         if found.trap != want.trap {
