@@ -13,7 +13,7 @@ const MAX_FUNCTION_LINES: usize = 70;
 const LONG_FILES: &[(&str, &str)] = &[];
 
 /// Functions that may be longer, each with the reason: `file: function`.
-const LONG_FUNCTIONS: &[(&str, &str)] = &[];
+const LONG_FUNCTIONS: &[(&str, &str)] = &[("interp/src/run.rs: run", "the dispatch loop: one arm an operation")];
 
 /// Which workspace crates each crate may depend on.
 const ARROWS: &[(&str, &[&str])] = &[
@@ -201,7 +201,12 @@ fn every_crate_opens_with_a_page() {
 #[test]
 fn dependencies_are_not_doubled_beyond_what_is_known() {
     // Names that the lock file holds in more than one version, each with whose fault it is.
-    let known: BTreeMap<&str, &str> = BTreeMap::from([]);
+    let known: BTreeMap<&str, &str> = BTreeMap::from([
+        ("bitflags", "region, of cranelift-jit, is still at 1"),
+        ("hashbrown", "gimli, of cranelift-codegen, is one behind indexmap"),
+        ("syn", "macros of the curve25519 crates are still at 2"),
+        ("windows-sys", "region, of cranelift-jit; not compiled here"),
+    ]);
     let lock = fs::read_to_string(root().join("Cargo.lock")).unwrap();
     let mut versions: BTreeMap<&str, usize> = BTreeMap::new();
     for line in lock.lines().filter_map(|l| l.strip_prefix("name = \"")) {
