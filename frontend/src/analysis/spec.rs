@@ -120,6 +120,10 @@ impl<'a> Analyzer<'a> {
             TypeSource::Declared(decl) => {
                 let (ty, default) = self.resolve_spec_inner(&decl.spec, None, Some(&decl.name));
                 let Some(init) = &decl.init else { return (ty, default) };
+                // The initial value may name the type's own values, so the type is known from here on.
+                if let Some(entry) = self.type_names.get_mut(&decl.name.symbol) {
+                    entry.state = State::Done((ty, default));
+                }
                 (ty, self.check_init(init, ty, None))
             }
             TypeSource::Block(pou) => {
