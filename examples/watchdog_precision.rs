@@ -7,21 +7,33 @@ use std::time::Instant;
 
 use khz_frontend::{CompileOptions, SourceInput};
 use khz_scheduler::time::DurationNs;
-use khz_scheduler::{Hooks, HostOptions, LoadOptions, MonotonicClock, NoInputs, NoIo, NoObserver, Resource, RunOptions, RunOutcome, on_scan_thread, run};
+use khz_scheduler::{
+    Hooks, HostOptions, LoadOptions, MonotonicClock, NoInputs, NoIo, NoObserver, Resource, RunOptions, RunOutcome,
+    on_scan_thread, run,
+};
 use kilohertz::pipeline::{self, EngineKind, Program};
 
 const WATCHDOG_US: u64 = 10_000;
 const RUNS: usize = 20;
 
 fn main() {
-    let source = SourceInput { name: "endless.st".into(), bytes: "PROGRAM main\n  WHILE TRUE DO END_WHILE;\nEND_PROGRAM".into() };
+    let source = SourceInput {
+        name: "endless.st".into(),
+        bytes: "PROGRAM main\n  WHILE TRUE DO END_WHILE;\nEND_PROGRAM".into(),
+    };
     let loaded = pipeline::compile(&[source], &CompileOptions::default()).expect("it compiles");
     for kind in EngineKind::BOTH {
-        let mut late_us: Vec<f64> = (0..RUNS).map(|_| on_scan_thread(&HostOptions::default(), |_| late_us(&loaded.programs[0], kind)).expect("a thread")).collect();
+        let mut late_us: Vec<f64> = (0..RUNS)
+            .map(|_| on_scan_thread(&HostOptions::default(), |_| late_us(&loaded.programs[0], kind)).expect("a thread"))
+            .collect();
         late_us.sort_by(f64::total_cmp);
         #[expect(clippy::print_stdout, reason = "the figures are what this example is for")]
         {
-            println!("{kind:?}: stopped {:.0} µs after the deadline (median of {RUNS}; maximum {:.0} µs)", late_us[RUNS / 2], late_us[RUNS - 1]);
+            println!(
+                "{kind:?}: stopped {:.0} µs after the deadline (median of {RUNS}; maximum {:.0} µs)",
+                late_us[RUNS / 2],
+                late_us[RUNS - 1]
+            );
         }
     }
 }

@@ -56,18 +56,7 @@ pub enum FileError {
 /// # Errors
 /// The first file that can not be taken.
 pub fn read(paths: &[PathBuf]) -> Result<Input, FileError> {
-    let mut files = Vec::new();
-    for path in paths {
-        if path.is_dir() {
-            let before = files.len();
-            collect_folder(path, &mut files)?;
-            if files.len() == before {
-                return Err(FileError::NoSources(path.clone()));
-            }
-        } else {
-            files.push(path.clone());
-        }
-    }
+    let files = list(paths)?;
     let mut sources = Vec::new();
     for path in &files {
         let bytes = read_file(path)?;
@@ -80,6 +69,26 @@ pub fn read(paths: &[PathBuf]) -> Result<Input, FileError> {
         sources.push(SourceInput { name: path.display().to_string(), bytes });
     }
     Ok(Input::Sources(sources))
+}
+
+/// The files that `paths` name: each file itself, of a folder all sources below it by path.
+///
+/// # Errors
+/// A folder that can not be listed or has no sources in it.
+pub fn list(paths: &[PathBuf]) -> Result<Vec<PathBuf>, FileError> {
+    let mut files = Vec::new();
+    for path in paths {
+        if path.is_dir() {
+            let before = files.len();
+            collect_folder(path, &mut files)?;
+            if files.len() == before {
+                return Err(FileError::NoSources(path.clone()));
+            }
+        } else {
+            files.push(path.clone());
+        }
+    }
+    Ok(files)
 }
 
 /// Reads one file whole.

@@ -73,18 +73,19 @@ impl Plan {
         let entries = plan.init.iter().chain(&plan.startup).chain(&plan.instances);
         let mut open: Vec<Key> = entries.map(|entry| entry.key).collect();
         let mut methods = BTreeSet::new();
-        while let Some(key) = open.pop() {
-            if plan.functions.contains_key(&key) {
-                continue;
+        loop {
+            while let Some(key) = open.pop() {
+                if !plan.functions.contains_key(&key) {
+                    let callees = plan.callees(scope, key, &mut methods);
+                    open.extend(callees.iter().copied());
+                    plan.functions.insert(key, callees);
+                }
             }
-            let callees = plan.callees(scope, key, &mut methods);
-            open.extend(callees.iter().copied());
-            plan.functions.insert(key, callees);
-            if open.is_empty() && !methods.is_empty() {
-                open = meanings(scope, &std::mem::take(&mut methods));
+            if methods.is_empty() {
+                return plan;
             }
+            open = meanings(scope, &std::mem::take(&mut methods));
         }
-        plan
     }
 
     fn callees(&mut self, scope: &Scope<'_>, key: Key, methods: &mut BTreeSet<MethodId>) -> BTreeSet<Key> {

@@ -196,9 +196,14 @@ impl Engine for Jit {
     }
 
     /// # Panics
-    /// When the container has no such entry, the image is not of the layout that the code was compiled for, or there is no such task.
+    /// When the container has no such instance, the image is not of the layout that the code was compiled for, or there is no such task.
     fn run(&mut self, entry: Entry, image: &mut Image, limits: Limits<'_>) -> Result<(), Trap> {
-        let handle = self.handle(entry).expect("the scheduler runs only entries that the container has");
+        let handle = match (self.handle(entry), entry) {
+            (Some(handle), _) => handle,
+            // A container without such a function has nothing to do there.
+            (None, Entry::Init | Entry::Startup) => return Ok(()),
+            (None, Entry::Instance(_)) => panic!("the scheduler runs only instances that the container has"),
+        };
         let fuel = limits.fuel.as_ref().map_or(u64::MAX, |fuel| fuel.left);
         let virtuals = &self.parts.virtuals;
         let (status, context) = handle.run(image.bytes_mut(), limits.task_index, limits.deadline, fuel, virtuals);

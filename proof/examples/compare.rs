@@ -15,7 +15,10 @@ fn main() {
     let mut number = || arguments.next().and_then(|word| word.parse::<u64>().ok());
     let (first, count) = (number().unwrap_or(0), number().unwrap_or(1000));
     let wanted: Vec<String> = arguments.collect();
-    let makers: Vec<_> = common::makers().into_iter().filter(|maker| wanted.is_empty() || wanted.iter().any(|name| name == maker.name)).collect();
+    let makers: Vec<_> = common::makers()
+        .into_iter()
+        .filter(|maker| wanted.is_empty() || wanted.iter().any(|name| name == maker.name))
+        .collect();
     let mut statistics = Statistics::default();
     let mut differences = 0;
     for seed in first..first + count {

@@ -95,7 +95,8 @@ struct Step {
 /// The runs of a series: entry, task, number of the scan.
 fn entries(verified: &Verified, scans: u32) -> Vec<(Entry, usize, u32)> {
     let container = verified.container();
-    let starts = [(Entry::Init, container.parameters.init_function), (Entry::Startup, container.parameters.startup_function)];
+    let starts =
+        [(Entry::Init, container.parameters.init_function), (Entry::Startup, container.parameters.startup_function)];
     let starts = starts.into_iter().filter(|(_, function)| function.is_some());
     let mut entries: Vec<(Entry, usize, u32)> = starts.map(|(entry, _)| (entry, 0, 0)).collect();
     for scan in 0..scans {
@@ -117,7 +118,14 @@ fn give_inputs(image: &mut Image, seed: u64, number: usize) {
 }
 
 /// Runs one step in an engine: the result and the fuel that is left.
-fn run(engine: &mut dyn Engine, image: &mut Image, entry: Entry, task: usize, fuel: Option<u64>, stopped: bool) -> (Result<(), Trap>, u64) {
+fn run(
+    engine: &mut dyn Engine,
+    image: &mut Image,
+    entry: Entry,
+    task: usize,
+    fuel: Option<u64>,
+    stopped: bool,
+) -> (Result<(), Trap>, u64) {
     let deadline = DeadlineCell::new();
     if stopped {
         deadline.expire(TrapCode::Stopped);
@@ -166,7 +174,13 @@ pub fn compare(verified: &Arc<Verified>, makers: &[Maker<'_>], plan: &Plan, stat
     Outcome::Equal
 }
 
-fn reference(evaluator: &mut Evaluator, first: &Image, plan: &Plan, verified: &Verified, cut: Option<(u64, bool)>) -> Vec<Step> {
+fn reference(
+    evaluator: &mut Evaluator,
+    first: &Image,
+    plan: &Plan,
+    verified: &Verified,
+    cut: Option<(u64, bool)>,
+) -> Vec<Step> {
     let mut image = first.clone();
     let mut steps = Vec::new();
     for (number, (entry, task, scan)) in entries(verified, plan.scans).into_iter().enumerate() {
@@ -180,7 +194,14 @@ fn reference(evaluator: &mut Evaluator, first: &Image, plan: &Plan, verified: &V
 }
 
 /// Repeats a series; what is not like the evaluator did it, if anything.
-fn repeat(engine: &mut dyn Engine, first: &Image, plan: &Plan, steps: &[Step], with_fuel: bool, verified: &Verified) -> Option<String> {
+fn repeat(
+    engine: &mut dyn Engine,
+    first: &Image,
+    plan: &Plan,
+    steps: &[Step],
+    with_fuel: bool,
+    verified: &Verified,
+) -> Option<String> {
     let mut image = first.clone();
     for (number, step) in steps.iter().enumerate() {
         give_inputs(&mut image, plan.seed, number);
@@ -189,7 +210,10 @@ fn repeat(engine: &mut dyn Engine, first: &Image, plan: &Plan, steps: &[Step], w
         let place = format!("run {number} ({:?}, task {}, fuel {fuel:?})", step.entry, step.task);
         if result != step.result {
             let (wanted, found) = (describe(&step.result, verified), describe(&result, verified));
-            return Some(format!("{place} ends otherwise\n  evaluator: {wanted}\n  engine:    {found}\n{}", code_of(&step.result, &result, verified)));
+            return Some(format!(
+                "{place} ends otherwise\n  evaluator: {wanted}\n  engine:    {found}\n{}",
+                code_of(&step.result, &result, verified)
+            ));
         }
         if with_fuel && left != step.left {
             return Some(format!("{place} leaves {left} units of fuel, not {}", step.left));
@@ -206,18 +230,24 @@ fn describe(result: &Result<(), Trap>, verified: &Verified) -> String {
         Ok(()) => "it returns".to_string(),
         Err(trap) => {
             let facts = verified.facts().functions.get(trap.place.function.index());
-            let placed = facts.and_then(|facts| facts.instructions.iter().find(|placed| placed.offset == trap.place.offset));
+            let placed =
+                facts.and_then(|facts| facts.instructions.iter().find(|placed| placed.offset == trap.place.offset));
             let name = placed.map_or("no instruction", |placed| placed.instruction.mnemonic());
-            let chain: Vec<String> = trap.chain().iter().map(|place| format!("{}@{}", place.function, place.offset)).collect();
+            let chain: Vec<String> =
+                trap.chain().iter().map(|place| format!("{}@{}", place.function, place.offset)).collect();
             let (function, offset) = (trap.place.function, trap.place.offset);
-            format!("trap {} {:?} at function {function} byte {offset} ({name}), called from {chain:?}", trap.code, trap.values)
+            format!(
+                "trap {} {:?} at function {function} byte {offset} ({name}), called from {chain:?}",
+                trap.code, trap.values
+            )
         }
     }
 }
 
 /// The text of the functions in which two results trapped.
 fn code_of(wanted: &Result<(), Trap>, found: &Result<(), Trap>, verified: &Verified) -> String {
-    let mut functions: Vec<_> = [wanted, found].iter().filter_map(|result| result.as_ref().err()).map(|trap| trap.place.function).collect();
+    let mut functions: Vec<_> =
+        [wanted, found].iter().filter_map(|result| result.as_ref().err()).map(|trap| trap.place.function).collect();
     functions.dedup();
     functions.iter().filter_map(|id| disassemble_function(verified.container(), *id)).collect()
 }
@@ -225,10 +255,17 @@ fn code_of(wanted: &Result<(), Trap>, found: &Result<(), Trap>, verified: &Verif
 /// The first differing bytes of each region.
 fn differing_bytes(found: &Image, wanted: &Image) -> String {
     let layout = found.layout();
-    let regions = [("slots", &layout.slots), ("data", &layout.data), ("%M", &layout.memory), ("%Q", &layout.output), ("%I", &layout.input)];
+    let regions = [
+        ("slots", &layout.slots),
+        ("data", &layout.data),
+        ("%M", &layout.memory),
+        ("%Q", &layout.output),
+        ("%I", &layout.input),
+    ];
     let mut text = String::new();
     for (name, range) in regions {
-        let differing = (range.start..range.end).filter(|at| found.bytes()[*at as usize] != wanted.bytes()[*at as usize]);
+        let differing =
+            (range.start..range.end).filter(|at| found.bytes()[*at as usize] != wanted.bytes()[*at as usize]);
         for at in differing.take(16) {
             let (found, wanted) = (found.bytes()[at as usize], wanted.bytes()[at as usize]);
             // A String takes everything.
@@ -253,7 +290,10 @@ fn note(statistics: &mut Statistics, series: &[Vec<Step>], ended: bool, verified
     }
     let loops = || facts.functions.iter().flat_map(|function| &function.loops);
     statistics.feature("a FOR loop of proven control", loops().any(|found| found.control_is_proven));
-    statistics.feature("a FOR loop of unproven control", loops().any(|found| found.for_loop.is_some() && !found.control_is_proven));
+    statistics.feature(
+        "a FOR loop of unproven control",
+        loops().any(|found| found.for_loop.is_some() && !found.control_is_proven),
+    );
     statistics.feature("another loop", loops().any(|found| found.for_loop.is_none()));
     statistics.feature("nested loops", loops().any(|found| found.depth > 1));
     statistics.feature("foreign floats", facts.foreign_floats);
@@ -266,10 +306,13 @@ fn note(statistics: &mut Statistics, series: &[Vec<Step>], ended: bool, verified
 
 /// Makes the container of a difference small: `makers` is the engine that differed (others cost time). The text of the small container follows the new difference.
 pub fn reduce(verified: &Verified, makers: &[Maker<'_>], plan: &Plan, tries: usize) -> (crate::shrink::Shrunk, String) {
-    let difference = |verified: &Verified| compare(&Arc::new(verified.clone()), makers, plan, &mut Statistics::default()).difference();
+    let difference = |verified: &Verified| {
+        compare(&Arc::new(verified.clone()), makers, plan, &mut Statistics::default()).difference()
+    };
     let differs = |verified: &Verified| difference(verified).is_some();
     let shrunk = crate::shrink::Shrinker { differs: &differs, tries }.shrink(verified);
-    let description = difference(&shrunk.verified).map_or_else(|| "the difference is gone".to_string(), |found| found.description);
+    let description =
+        difference(&shrunk.verified).map_or_else(|| "the difference is gone".to_string(), |found| found.description);
     let description = format!("{description}\n{}", shrunk.text);
     (shrunk, description)
 }

@@ -76,7 +76,13 @@ impl Random {
             1 => self.between(-300, 300),
             2 => (1_i64 << self.below(width as usize)).wrapping_add(near),
             3 => {
-                let ends = [i64::from(i8::MIN), i64::from(u8::MAX), i64::from(i16::MAX), i64::from(u16::MAX), i64::from(i32::MIN)];
+                let ends = [
+                    i64::from(i8::MIN),
+                    i64::from(u8::MAX),
+                    i64::from(i16::MAX),
+                    i64::from(u16::MAX),
+                    i64::from(i32::MIN),
+                ];
                 let far = [i64::from(i32::MAX), i64::from(u32::MAX), i64::MIN, i64::MAX];
                 let end = if width > 32 && self.chance(60) { self.one_of(far) } else { self.one_of(ends) };
                 end.wrapping_add(near)
@@ -104,7 +110,13 @@ impl Random {
                 self.one_of(plain)
             }
             1 => {
-                let odd = [f64::INFINITY, f64::NEG_INFINITY, f64::from_bits(0xFFF8_0000_0000_0000), f64::MAX, f64::MIN_POSITIVE];
+                let odd = [
+                    f64::INFINITY,
+                    f64::NEG_INFINITY,
+                    f64::from_bits(0xFFF8_0000_0000_0000),
+                    f64::MAX,
+                    f64::MIN_POSITIVE,
+                ];
                 let tiny = [5e-324, -5e-324, f64::from(f32::MIN_POSITIVE), 1e-45, f64::from(f32::MAX), 1e300, -1e-300];
                 if self.chance(50) { self.one_of(odd) } else { self.one_of(tiny) }
             }
@@ -152,10 +164,12 @@ mod tests {
 
     #[test]
     fn a_seed_gives_the_same_numbers_and_neighbours_others() {
-        let first: Vec<u64> = (0..8).map({
-            let mut random = Random::new(7);
-            move |_| random.bits()
-        }).collect();
+        let first: Vec<u64> = (0..8)
+            .map({
+                let mut random = Random::new(7);
+                move |_| random.bits()
+            })
+            .collect();
         let mut again = Random::new(7);
         assert!(first.iter().all(|bits| again.bits() == *bits));
         assert_ne!(Random::new(8).bits(), first[0]);
@@ -176,6 +190,9 @@ mod tests {
         for wanted in [f64::is_nan as fn(f64) -> bool, f64::is_infinite, f64::is_subnormal, f64::is_sign_negative] {
             assert!(floats.iter().any(|value| wanted(*value)));
         }
-        assert!((0..2000).any(|_| random.integer(64) == i64::MIN) && (0..2000).all(|_| i32::try_from(random.integer(32)).is_ok()));
+        assert!(
+            (0..2000).any(|_| random.integer(64) == i64::MIN)
+                && (0..2000).all(|_| i32::try_from(random.integer(32)).is_ok())
+        );
     }
 }

@@ -40,6 +40,7 @@ impl Shrinker<'_> {
             self.drop_tables(&mut best);
             self.empty_functions(&mut best);
             self.drop_functions(&mut best);
+            self.attempt(&mut best, drop_unused_constants);
             for function in 0..best.container().functions.len() {
                 self.delete_ranges(&mut best, function);
                 self.simplify(&mut best, function);
@@ -112,6 +113,10 @@ impl Shrinker<'_> {
             });
         }
         while self.attempt(best, |container| drop(container.types.types.pop())) {}
+        while self.attempt(best, |container| drop(container.types.arrays.pop())) {}
+        while self.attempt(best, |container| drop(container.types.methods.pop())) {}
+        while self.attempt(best, |container| _ = container.constants.pop()) {}
+        while self.attempt(best, |container| _ = container.types.slots.pop()) {}
     }
 
     /// Bodies that only return zeros.
@@ -161,7 +166,8 @@ impl Shrinker<'_> {
         for at in 0..instructions_of(&best.container().functions[function]).len() {
             for span in [1, 2, 3, 4] {
                 for value in [0_u8, 1] {
-                    let replaced = self.attempt(best, |container| replace_by_constant(container, function, at, span, value));
+                    let replaced =
+                        self.attempt(best, |container| replace_by_constant(container, function, at, span, value));
                     if replaced {
                         break;
                     }
@@ -187,11 +193,15 @@ impl Shrinker<'_> {
 fn weight(container: &Container) -> usize {
     let code: usize = container.functions.iter().map(|function| function.code.len() + function.locals.len() + 4).sum();
     let types = &container.types;
-    code + types.init_image.len() + types.data.len() + types.types.len() + container.tasks.tasks.len() + container.tasks.instances.len()
+    code + types.init_image.len()
+        + types.data.len()
+        + types.types.len()
+        + container.tasks.tasks.len()
+        + container.tasks.instances.len()
 }
 
 /// The instructions of a function, as far as they can be read.
-fn instructions_of(function: &Function) -> Vec<Instruction> {
+pub(crate) fn instructions_of(function: &Function) -> Vec<Instruction> {
     let mut reader = Reader::new(&function.code);
     let mut found = Vec::new();
     while !reader.is_at_end() {
@@ -202,7 +212,10 @@ fn instructions_of(function: &Function) -> Vec<Instruction> {
 }
 
 /// Changes the code of a function; `change` says where, how many instructions went and how many came. FOR descriptors that lost their `for.enter` go.
-fn change_code(function: &mut Function, change: impl FnOnce(&mut Vec<Instruction>) -> (usize, usize, usize)) {
+pub(crate) fn change_code(
+    function: &mut Function,
+    change: impl FnOnce(&mut Vec<Instruction>) -> (usize, usize, usize),
+) {
     let mut code = instructions_of(function);
     let mut offsets = Vec::new();
     let mut end = 0;
@@ -225,7 +238,8 @@ fn change_code(function: &mut Function, change: impl FnOnce(&mut Vec<Instruction
     for instruction in &mut code {
         relabel(instruction, |label| Label(moved(label.0 as usize).min(count) as u32));
     }
-    let entered = |id: usize| code.iter().any(|i| matches!(i, Instruction::ForEnter { id: found, .. } if found.index() == id));
+    let entered =
+        |id: usize| code.iter().any(|i| matches!(i, Instruction::ForEnter { id: found, .. } if found.index() == id));
     let kept: Vec<usize> = (0..function.for_loops.len()).filter(|id| entered(*id)).collect();
     function.for_loops = kept.iter().map(|id| function.for_loops[*id]).collect();
     for instruction in &mut code {
@@ -283,12 +297,19 @@ fn replace_by_constant(container: &mut Container, function: usize, at: usize, sp
     });
 }
 
-fn slot_type(container: &Container, function: usize, place: SlotPlace, index: SlotIndex) -> Option<khz_bytecode::value::ValueType> {
+fn slot_type(
+    container: &Container,
+    function: usize,
+    place: SlotPlace,
+    index: SlotIndex,
+) -> Option<khz_bytecode::value::ValueType> {
     use khz_bytecode::value::LocalType;
     let function = &container.functions[function];
     let storage = match (place, function.owner) {
         (SlotPlace::Global, _) => *container.types.slots.get(index.index())?,
-        (SlotPlace::Program, Owner::Program(program)) => *container.types.programs.get(program.index())?.slots.get(index.index())?,
+        (SlotPlace::Program, Owner::Program(program)) => {
+            *container.types.programs.get(program.index())?.slots.get(index.index())?
+        }
         (SlotPlace::Local, _) => match function.locals.get(index.index())? {
             LocalType::Scalar(storage) => *storage,
             LocalType::Ref(_) => return None,
@@ -306,8 +327,17 @@ fn drop_instance(container: &mut Container, number: usize) {
         let block = container.types.block_instances[first].offset;
         container.types.block_instances.drain(first..first + count);
         container.types.data.retain(|variable| variable.offset != block);
-        let end = container.types.data.iter().map(|variable| variable.offset).find(|offset| *offset > block).unwrap_or(u32::MAX);
-        container.types.init_image.retain(|run| run.region != khz_bytecode::container::Region::Data || !(block..end).contains(&run.offset));
+        let end = container
+            .types
+            .data
+            .iter()
+            .map(|variable| variable.offset)
+            .find(|offset| *offset > block)
+            .unwrap_or(u32::MAX);
+        container
+            .types
+            .init_image
+            .retain(|run| run.region != khz_bytecode::container::Region::Data || !(block..end).contains(&run.offset));
     }
     for instance in container.tasks.instances.iter_mut().filter(|instance| instance.block_offset > gone.block_offset) {
         instance.block_offset = instance.block_offset.saturating_sub(gone.block_count);
@@ -317,7 +347,9 @@ fn drop_instance(container: &mut Container, number: usize) {
 /// Removes a function that nothing names.
 fn drop_function(container: &mut Container, number: usize) {
     let is_named = |id: FunctionId| id.index() == number;
-    let by_code = |function: &Function| instructions_of(function).iter().any(|i| matches!(i, Instruction::Call { function } if is_named(*function)));
+    let by_code = |function: &Function| {
+        instructions_of(function).iter().any(|i| matches!(i, Instruction::Call { function } if is_named(*function)))
+    };
     let by_type = |ty: &Type| matches!(ty, Type::Block { methods, .. } if methods.iter().any(|(_, function)| is_named(*function)));
     let starts = [container.parameters.init_function, container.parameters.startup_function];
     if container.functions.iter().any(by_code)
@@ -350,6 +382,27 @@ fn drop_function(container: &mut Container, number: usize) {
     container.tasks.instances.iter_mut().for_each(|instance| lower(&mut instance.entry));
 }
 
+/// Removes constants that no code names.
+fn drop_unused_constants(container: &mut Container) {
+    let mut codes: Vec<Vec<Instruction>> = container.functions.iter().map(instructions_of).collect();
+    let mut used = std::collections::BTreeSet::new();
+    for instruction in codes.iter().flatten() {
+        if let Instruction::Const { id } = instruction {
+            used.insert(*id);
+        }
+    }
+    for instruction in codes.iter_mut().flatten() {
+        if let Instruction::Const { id } = instruction {
+            id.0 = used.iter().take_while(|other| *other < id).count() as u16;
+        }
+    }
+    container.constants = used.iter().filter_map(|id| container.constants.get(id.index()).copied()).collect();
+    for (function, code) in container.functions.iter_mut().zip(&codes) {
+        function.code.clear();
+        code.iter().for_each(|instruction| instruction.encode(&mut function.code));
+    }
+}
+
 /// Removes locals behind the parameters that nothing names.
 fn drop_unused_locals(function: &mut Function) {
     let mut code = instructions_of(function);
@@ -361,7 +414,9 @@ fn drop_unused_locals(function: &mut Function) {
         }
     };
     for instruction in &code {
-        if let Instruction::SlotLoad { place: SlotPlace::Local, index } | Instruction::SlotStore { place: SlotPlace::Local, index } = instruction {
+        if let Instruction::SlotLoad { place: SlotPlace::Local, index }
+        | Instruction::SlotStore { place: SlotPlace::Local, index } = instruction
+        {
             mark(*index);
         }
     }
@@ -372,9 +427,12 @@ fn drop_unused_locals(function: &mut Function) {
             mark(index);
         }
     }
-    let position = |index: &mut SlotIndex| index.0 = used.iter().take(index.index()).filter(|used| **used).count() as u16;
+    let position =
+        |index: &mut SlotIndex| index.0 = used.iter().take(index.index()).filter(|used| **used).count() as u16;
     for instruction in &mut code {
-        if let Instruction::SlotLoad { place: SlotPlace::Local, index } | Instruction::SlotStore { place: SlotPlace::Local, index } = instruction {
+        if let Instruction::SlotLoad { place: SlotPlace::Local, index }
+        | Instruction::SlotStore { place: SlotPlace::Local, index } = instruction
+        {
             position(index);
         }
     }

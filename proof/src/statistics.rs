@@ -101,7 +101,15 @@ impl Statistics {
         let mut text = String::new();
         let runs = self.runs.max(1);
         // A String takes everything.
-        let _ = writeln!(text, "programs {} (without fuel too: {}), runs {}, trapped {} ({}%)", self.programs, self.without_fuel, self.runs, self.trapped, self.trapped * 100 / runs);
+        let _ = writeln!(
+            text,
+            "programs {} (without fuel too: {}), runs {}, trapped {} ({}%)",
+            self.programs,
+            self.without_fuel,
+            self.runs,
+            self.trapped,
+            self.trapped * 100 / runs
+        );
         let _ = writeln!(text, "instructions executed {}, written {}", self.executed.total(), self.written.total());
         for code in TrapCode::ALL {
             let _ = writeln!(text, "trap {}: {}", code.name(), self.executed.trap_count(*code));

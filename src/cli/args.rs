@@ -32,6 +32,8 @@ pub enum Command {
     Bench(BenchArgs),
     /// Run both engines in lock-step and report the first difference
     Diff(DiffArgs),
+    /// Format Structured Text in place; comments and blank lines are kept
+    Fmt(FmtArgs),
 }
 
 /// How results are printed.
@@ -283,6 +285,38 @@ pub struct DiffArgs {
     #[command(flatten)]
     #[allow(missing_docs, reason = "clap would show it as help of the group")]
     pub resource: ResourceArgs,
+    #[command(flatten)]
+    #[allow(missing_docs, reason = "clap would show it as help of the group")]
+    pub common: Common,
+}
+
+/// How reserved words are written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum KeywordsArg {
+    /// In upper case.
+    Upper,
+    /// As they are.
+    Keep,
+}
+
+/// `khz fmt`.
+#[derive(Debug, Args)]
+pub struct FmtArgs {
+    /// Structured Text files or folders of them; `-` alone formats stdin to stdout
+    #[arg(required = true, value_name = "FILE")]
+    pub files: Vec<PathBuf>,
+    /// Write nothing; list the files that are formatted otherwise, and exit with 1 if there are any
+    #[arg(long)]
+    pub check: bool,
+    /// Spaces of one level
+    #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u8).range(0..=i64::from(khz_frontend::format::MAX_INDENT)))]
+    pub indent: u8,
+    /// Characters after which a line is broken
+    #[arg(long, value_name = "N", default_value_t = 100)]
+    pub width: usize,
+    /// How reserved words are written
+    #[arg(long, value_enum, default_value = "upper")]
+    pub keywords: KeywordsArg,
     #[command(flatten)]
     #[allow(missing_docs, reason = "clap would show it as help of the group")]
     pub common: Common,

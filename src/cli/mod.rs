@@ -7,6 +7,7 @@ mod check;
 mod diff;
 mod disasm;
 mod explain;
+mod fmt;
 mod inputs;
 mod output;
 mod report;
@@ -65,6 +66,7 @@ pub fn main() -> ExitCode {
         Command::Run(args) => (args.common.format, run::run(args)),
         Command::Bench(args) => (args.common.format, bench::run(args)),
         Command::Diff(args) => (args.common.format, diff::run(args)),
+        Command::Fmt(args) => (args.common.format, fmt::run(args)),
     };
     let status = outcome.unwrap_or_else(|failure| failure.report(format));
     ExitCode::from(status as u8)

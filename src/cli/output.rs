@@ -132,7 +132,8 @@ pub fn print_diagnostics(diagnostics: &[Diagnostic], sources: &SourceMap, format
     }
 }
 
-fn diagnostic_json(diagnostic: &Diagnostic, sources: &SourceMap) -> Value {
+/// A diagnostic as programs read it.
+pub fn diagnostic_json(diagnostic: &Diagnostic, sources: &SourceMap) -> Value {
     let place = |span: khz_frontend::source::Span| {
         let at = sources.line_column(span);
         let end = sources.line_column(khz_frontend::source::Span::new(span.file, span.end, span.end));

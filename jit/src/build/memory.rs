@@ -45,7 +45,8 @@ impl Builder<'_> {
             Code::RefStore { storage } => {
                 let value = self.pop();
                 let (address, _) = self.pop_ref();
-                self.effect(Op::Store(address, self.byte_access(*storage, false), value));
+                let wrapped = self.wrap_bool(*storage, value);
+                self.effect(Op::Store(address, self.byte_access(*storage, false), wrapped));
             }
             Code::RefField { owner, field } => self.ref_field(*owner, *field),
             Code::RefIndex { array } => self.ref_index(*array),

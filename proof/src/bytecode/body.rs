@@ -81,11 +81,16 @@ pub(crate) struct Body<'w> {
 impl<'w> Body<'w> {
     pub fn new(world: &'w mut World, id: FunctionId) -> Self {
         let function = world.container.functions[id.index()].clone();
-        let mut places: Vec<Place> =
-            world.data.iter().map(|(offset, ty, write)| Place { place: BytePlace::Data, offset: *offset, ty: *ty, write: *write }).collect();
+        let mut places: Vec<Place> = world
+            .data
+            .iter()
+            .map(|(offset, ty, write)| Place { place: BytePlace::Data, offset: *offset, ty: *ty, write: *write })
+            .collect();
         let own = match function.owner {
             Owner::None => None,
-            Owner::Program(program) => world.container.types.programs[program.index()].block.map(|ty| (BytePlace::Block, ty)),
+            Owner::Program(program) => {
+                world.container.types.programs[program.index()].block.map(|ty| (BytePlace::Block, ty))
+            }
             Owner::Block(ty) => Some((BytePlace::This, ty)),
         };
         for (place, root) in own.into_iter().chain(function.frame.map(|ty| (BytePlace::Frame, ty))) {
@@ -100,7 +105,19 @@ impl<'w> Body<'w> {
             }
         }
         let left = world.profile.size;
-        Body { world, id, function, code: Code::default(), left, waiting: 0, around: Vec::new(), places, scalars, counters: Vec::new(), references }
+        Body {
+            world,
+            id,
+            function,
+            code: Code::default(),
+            left,
+            waiting: 0,
+            around: Vec::new(),
+            places,
+            scalars,
+            counters: Vec::new(),
+            references,
+        }
     }
 
     pub fn put(&mut self, instruction: Instruction) {
@@ -207,7 +224,8 @@ impl<'w> Body<'w> {
     /// A place of exactly this type.
     pub fn typed_place(&mut self, ty: TypeId, write: bool) -> Option<Place> {
         let of_type = |place: &&Place| place.ty == ty && (place.write || !write);
-        let own: Vec<Place> = self.places.iter().filter(of_type).filter(|place| place.place != BytePlace::Data).copied().collect();
+        let own: Vec<Place> =
+            self.places.iter().filter(of_type).filter(|place| place.place != BytePlace::Data).copied().collect();
         if !own.is_empty() && self.world.random.chance(60) {
             return self.world.random.pick(&own).copied();
         }
@@ -219,14 +237,19 @@ impl<'w> Body<'w> {
     pub fn variable_of(&mut self, storage: Storage, write: bool) -> Option<Variable> {
         match self.world.random.weighted(&[6, 3, 1]) {
             0 => self.slot(storage, write),
-            1 => self.typed_place(World::scalar(storage), write).map(|found| Variable::Bytes(found.place, storage, found.offset)),
-            _ => self.image_place(storage.bytes(), write).map(|(place, offset)| Variable::Bytes(place, storage, offset)),
+            1 => self
+                .typed_place(World::scalar(storage), write)
+                .map(|found| Variable::Bytes(found.place, storage, found.offset)),
+            _ => {
+                self.image_place(storage.bytes(), write).map(|(place, offset)| Variable::Bytes(place, storage, offset))
+            }
         }
     }
 
     /// A variable whose value has this type.
     pub fn variable(&mut self, ty: ValueType, write: bool) -> Variable {
-        let storages: Vec<Storage> = Storage::ALL.iter().copied().filter(|storage| storage.value_type() == ty).collect();
+        let storages: Vec<Storage> =
+            Storage::ALL.iter().copied().filter(|storage| storage.value_type() == ty).collect();
         for _ in 0..4 {
             let storage = storages[self.world.random.below(storages.len())];
             if let Some(found) = self.variable_of(storage, write) {

@@ -11,7 +11,9 @@ impl Body<'_> {
     /// Functions that this one may call. Calls go to later functions only, so they form no cycle.
     fn callees(&self) -> Vec<FunctionId> {
         let functions = self.world.container.functions.iter().enumerate().skip(self.id.index() + 1);
-        let allowed = functions.filter(|(_, function)| !matches!(function.owner, Owner::Program(_)) || function.owner == self.function.owner);
+        let allowed = functions.filter(|(_, function)| {
+            !matches!(function.owner, Owner::Program(_)) || function.owner == self.function.owner
+        });
         // An entry function is a program's affair alone, but a call to it is as good as any other.
         allowed.map(|(at, _)| FunctionId(at as u16)).collect()
     }
@@ -63,7 +65,8 @@ impl Body<'_> {
     fn call_virtual(&mut self, method: MethodId, depth: usize) -> Vec<ValueType> {
         let signature = self.world.container.types.methods[method.index()].clone();
         let types = self.world.container.types.types.iter().enumerate();
-        let has = |ty: &Type| matches!(ty, Type::Block { methods, .. } if methods.iter().any(|(name, _)| *name == method));
+        let has =
+            |ty: &Type| matches!(ty, Type::Block { methods, .. } if methods.iter().any(|(name, _)| *name == method));
         let blocks: Vec<TypeId> = types.filter(|(_, ty)| has(ty)).map(|(at, _)| TypeId(at as u16)).collect();
         let careful = self.world.random.chance(self.world.profile.care);
         match self.world.random.pick(&blocks).copied().filter(|_| careful) {
@@ -88,7 +91,8 @@ impl Body<'_> {
         let mut callees = self.callees();
         callees.retain(|id| first(&self.world.container.functions[id.index()].results));
         let methods = self.world.container.types.methods.iter().enumerate();
-        let methods: Vec<MethodId> = methods.filter(|(_, method)| first(&method.results)).map(|(at, _)| MethodId(at as u16)).collect();
+        let methods: Vec<MethodId> =
+            methods.filter(|(_, method)| first(&method.results)).map(|(at, _)| MethodId(at as u16)).collect();
         let is_virtual = self.world.profile.virtual_calls && self.world.random.chance(40);
         let results = if let Some(method) = self.world.random.pick(&methods).copied().filter(|_| is_virtual) {
             self.call_virtual(method, depth - 1)

@@ -56,7 +56,9 @@ pub(crate) fn encode(instructions: &mut [Instruction], position_of: impl Fn(Labe
 /// Changes every label of an instruction.
 pub(crate) fn relabel(instruction: &mut Instruction, change: impl Fn(Label) -> Label) {
     match instruction {
-        Instruction::Jump { target } | Instruction::JumpIf { target } | Instruction::JumpUnless { target } => *target = change(*target),
+        Instruction::Jump { target } | Instruction::JumpIf { target } | Instruction::JumpUnless { target } => {
+            *target = change(*target);
+        }
         Instruction::Switch { targets } => targets.iter_mut().for_each(|target| *target = change(*target)),
         Instruction::ForEnter { exit, .. } => *exit = change(*exit),
         Instruction::ForNext { header, .. } => *header = change(*header),

@@ -15,7 +15,8 @@ impl Body<'_> {
             let bits = self.world.random.value_bits(ty);
             return self.constant_bits(ty, bits);
         }
-        if ty == ValueType::I32 && self.world.random.chance(10)
+        if ty == ValueType::I32
+            && self.world.random.chance(10)
             && let Some((place, offset)) = self.image_place(1, false)
         {
             let bit = self.world.random.below(8) as u8;
@@ -102,7 +103,11 @@ impl Body<'_> {
         let (other, end) = (self.code.label(), self.code.label());
         self.expression(ValueType::I32, depth - 1);
         let unless = self.world.random.chance(50);
-        self.put(if unless { Instruction::JumpUnless { target: other } } else { Instruction::JumpIf { target: other } });
+        self.put(if unless {
+            Instruction::JumpUnless { target: other }
+        } else {
+            Instruction::JumpIf { target: other }
+        });
         self.expression(ty, depth - 1);
         self.put(Instruction::Jump { target: end });
         self.code.bind(other);
@@ -125,7 +130,15 @@ impl Body<'_> {
         if !self.world.random.chance(self.world.profile.care) {
             let width = if wide { 64 } else { 32 };
             (lower, upper) = (self.world.random.integer(width), self.world.random.integer(width));
-            let key = |value: i64| if kind.is_signed() { i128::from(value) } else if wide { i128::from(value as u64) } else { i128::from(value as u32) };
+            let key = |value: i64| {
+                if kind.is_signed() {
+                    i128::from(value)
+                } else if wide {
+                    i128::from(value as u64)
+                } else {
+                    i128::from(value as u32)
+                }
+            };
             if key(lower) > key(upper) {
                 (lower, upper) = (upper, lower);
             }
@@ -142,12 +155,17 @@ impl Body<'_> {
             }
             (lower, upper) = (0, 255);
         }
-        self.put(if wide { Instruction::CheckI64 { kind, lower, upper } } else { Instruction::CheckI32 { kind, lower: lower as i32, upper: upper as i32 } });
+        self.put(if wide {
+            Instruction::CheckI64 { kind, lower, upper }
+        } else {
+            Instruction::CheckI32 { kind, lower: lower as i32, upper: upper as i32 }
+        });
     }
 
     /// A scalar through a reference.
     fn loaded(&mut self, ty: ValueType, depth: usize) {
-        let storages: Vec<Storage> = Storage::ALL.iter().copied().filter(|storage| storage.value_type() == ty).collect();
+        let storages: Vec<Storage> =
+            Storage::ALL.iter().copied().filter(|storage| storage.value_type() == ty).collect();
         let storage = storages[self.world.random.below(storages.len())];
         self.reference(World::scalar(storage), false, false, depth);
         self.put(Instruction::RefLoad { storage });

@@ -16,7 +16,9 @@ impl Body<'_> {
                 1 => self.local_reference(target, write, typed),
                 2 if depth > 0 => self.inner_reference(target, write, typed, depth - 1),
                 3 if !typed => self.image_reference(target, write),
-                4 if self.world.profile.raw && !typed && depth > 0 => Some(self.raw_reference(target, write, depth - 1)),
+                4 if self.world.profile.raw && !typed && depth > 0 => {
+                    Some(self.raw_reference(target, write, depth - 1))
+                }
                 5 if depth > 0 => self.chosen_reference(target, depth - 1),
                 _ => None,
             };
@@ -92,7 +94,11 @@ impl Body<'_> {
     /// A reference out of an integer.
     fn raw_reference(&mut self, target: TypeId, write: bool, depth: usize) -> RefType {
         if self.world.random.chance(self.world.profile.care) {
-            let from = if self.world.random.chance(80) { target } else { TypeId(self.world.random.below(self.world.extents.len()) as u16) };
+            let from = if self.world.random.chance(80) {
+                target
+            } else {
+                TypeId(self.world.random.below(self.world.extents.len()) as u16)
+            };
             self.reference(from, write, false, depth);
             self.put(Instruction::RefToInt {});
         } else if self.world.random.chance(50) {

@@ -16,7 +16,22 @@ impl Body<'_> {
     pub fn statement(&mut self, depth: usize) {
         let nested = usize::from(depth > 0 && self.left > 0);
         let loops = nested * usize::from(self.around.len() < DEEPEST_NESTING);
-        match self.world.random.weighted(&[26, 12, 6, 10, 2, 4, 8, 10 * nested, 4 * nested, 7 * loops, 7 * loops, 4, 2, 1]) {
+        match self.world.random.weighted(&[
+            26,
+            12,
+            6,
+            10,
+            2,
+            4,
+            8,
+            10 * nested,
+            4 * nested,
+            7 * loops,
+            7 * loops,
+            4,
+            2,
+            1,
+        ]) {
             0 => self.assignment(depth),
             1 => self.store_through(depth),
             2 => self.copy(depth),
@@ -82,7 +97,9 @@ impl Body<'_> {
 
     /// Gives a reference local another target.
     fn reassign(&mut self, depth: usize) {
-        let Some((index, ty)) = self.world.random.pick(&self.references).copied() else { return self.assignment(depth) };
+        let Some((index, ty)) = self.world.random.pick(&self.references).copied() else {
+            return self.assignment(depth);
+        };
         self.reference(ty.target, ty.write, !ty.image, depth.min(2));
         self.put(Instruction::SlotStore { place: SlotPlace::Local, index });
     }
@@ -90,7 +107,11 @@ impl Body<'_> {
     fn choice(&mut self, depth: usize) {
         let (other, end) = (self.code.label(), self.code.label());
         self.expression(ValueType::I32, depth.min(2));
-        let jump = if self.world.random.chance(60) { Instruction::JumpUnless { target: other } } else { Instruction::JumpIf { target: other } };
+        let jump = if self.world.random.chance(60) {
+            Instruction::JumpUnless { target: other }
+        } else {
+            Instruction::JumpIf { target: other }
+        };
         self.put(jump);
         self.statements(depth);
         if self.world.random.chance(50) {
@@ -128,11 +149,16 @@ impl Body<'_> {
 
     /// Leaves a loop, begins its next pass, or returns; each under a condition.
     fn leave(&mut self, depth: usize) {
-        let reachable: Vec<Around> = self.around.iter().copied().filter(|around| around.waiting == self.waiting).collect();
+        let reachable: Vec<Around> =
+            self.around.iter().copied().filter(|around| around.waiting == self.waiting).collect();
         if let Some(around) = self.world.random.pick(&reachable).copied().filter(|_| self.world.random.chance(80)) {
             self.expression(ValueType::I32, depth.min(2));
             let target = if self.world.random.chance(60) { around.exit } else { around.next };
-            let jump = if self.world.random.chance(60) { Instruction::JumpIf { target } } else { Instruction::JumpUnless { target } };
+            let jump = if self.world.random.chance(60) {
+                Instruction::JumpIf { target }
+            } else {
+                Instruction::JumpUnless { target }
+            };
             return self.put(jump);
         }
         if self.waiting > 0 {
@@ -181,7 +207,11 @@ impl Body<'_> {
         };
         self.counters.push(counter);
         if tests_first {
-            if is_counted { count(self) } else { self.expression(ValueType::I32, 2) }
+            if is_counted {
+                count(self);
+            } else {
+                self.expression(ValueType::I32, 2);
+            }
             self.put(Instruction::JumpIf { target: exit });
             self.body(around, depth);
             self.put(Instruction::Jump { target: header });
@@ -189,7 +219,11 @@ impl Body<'_> {
             let next = self.code.label();
             self.body(Around { next, ..around }, depth);
             self.code.bind(next);
-            if is_counted { count(self) } else { self.expression(ValueType::I32, 2) }
+            if is_counted {
+                count(self);
+            } else {
+                self.expression(ValueType::I32, 2);
+            }
             self.put(Instruction::JumpUnless { target: header });
         }
         self.code.bind(exit);
@@ -238,7 +272,8 @@ impl Body<'_> {
             return;
         }
         let width = ty.storage().bytes() * 8;
-        let ends: (i128, i128) = if ty.is_signed() { (-(1 << (width - 1)), (1 << (width - 1)) - 1) } else { (0, (1 << width) - 1) };
+        let ends: (i128, i128) =
+            if ty.is_signed() { (-(1 << (width - 1)), (1 << (width - 1)) - 1) } else { (0, (1 << width) - 1) };
         let size = match self.world.random.below(6) {
             0 => (ends.1 - ends.0) / 3,
             1 => 7,
@@ -270,7 +305,8 @@ impl Body<'_> {
             self.leaf(width);
             self.integer(width, 0);
             let wide = width == ValueType::I64;
-            let (and, or) = if wide { (NumericOp::I64And, NumericOp::I64Or) } else { (NumericOp::I32And, NumericOp::I32Or) };
+            let (and, or) =
+                if wide { (NumericOp::I64And, NumericOp::I64Or) } else { (NumericOp::I32And, NumericOp::I32Or) };
             self.put(Instruction::Numeric(and));
             self.put(Instruction::Numeric(or));
         }

@@ -1,8 +1,8 @@
 //! What a program works on: types, variables, program types, tasks, heads of functions.
 
 use khz_bytecode::container::{
-    ArrayDescriptor, BlockInstance, Container, DataVariable, Field, Function, InitRun, MethodSignature, Owner, ProgramInstance,
-    ProgramType, Record, Region, Task, TaskExtension, TaskType, Type,
+    ArrayDescriptor, BlockInstance, Container, DataVariable, Field, Function, InitRun, MethodSignature, Owner,
+    ProgramInstance, ProgramType, Record, Region, Task, TaskExtension, TaskType, Type,
 };
 use khz_bytecode::ids::{ArrayId, FunctionId, InstanceId, MethodId, ProgramId, TaskId, TypeId};
 use khz_bytecode::value::{LocalType, RefType, Storage, ValueType};
@@ -67,7 +67,8 @@ impl World {
         };
         let container = Container::default();
         let (extents, inside, ways) = (Vec::new(), Vec::new(), Vec::new());
-        let mut world = World { random, container, profile, extents, inside, ways, has_block: Vec::new(), data: Vec::new() };
+        let mut world =
+            World { random, container, profile, extents, inside, ways, has_block: Vec::new(), data: Vec::new() };
         world.make_types();
         world.make_images();
         world.make_programs();
@@ -92,7 +93,8 @@ impl World {
             inside.extend(deeper.collect::<Vec<_>>());
         }
         inside.truncate(LISTED_PLACES);
-        let has_block = matches!(ty, Type::Block { .. }) || inside.iter().skip(1).any(|(_, part)| self.has_block[part.index()]);
+        let has_block =
+            matches!(ty, Type::Block { .. }) || inside.iter().skip(1).any(|(_, part)| self.has_block[part.index()]);
         self.has_block.push(has_block || self.parts_with_block(&ty));
         self.container.types.types.push(ty);
         self.extents.push(extent);
@@ -120,7 +122,11 @@ impl World {
             Type::WideString { capacity } => (Extent { size: 2 * (u32::from(*capacity) + 1), align: 2 }, Vec::new()),
             Type::Array(id) => {
                 let array = &self.container.types.arrays[id.index()];
-                let count: u32 = array.dimensions.iter().map(|(lower, upper)| (i64::from(*upper) - i64::from(*lower) + 1) as u32).product();
+                let count: u32 = array
+                    .dimensions
+                    .iter()
+                    .map(|(lower, upper)| (i64::from(*upper) - i64::from(*lower) + 1) as u32)
+                    .product();
                 let extent = Extent { size: count * array.stride, align: self.extents[array.element.index()].align };
                 let mut elements = vec![0, count / 2, count - 1];
                 elements.dedup();
@@ -239,7 +245,8 @@ impl World {
             self.add_block(base);
         }
         for _ in 0..self.random.between(1, 3) {
-            let element = if self.random.chance(40) { TypeId(self.extents.len() as u16 - 1) } else { self.any_type(true) };
+            let element =
+                if self.random.chance(40) { TypeId(self.extents.len() as u16 - 1) } else { self.any_type(true) };
             self.add_array(element);
         }
         for _ in 0..self.random.between(1, 3) {
@@ -305,14 +312,27 @@ impl World {
             let cyclic = self.random.chance(70);
             let task_type = if cyclic { TaskType::Cyclic } else { TaskType::Freewheeling };
             let interval_us = if cyclic { 1000 } else { 0 };
-            self.container.tasks.tasks.push(Task { id: TaskId(id + 5), task_type, enabled: true, interval_us, ..Task::default() });
+            self.container.tasks.tasks.push(Task {
+                id: TaskId(id + 5),
+                task_type,
+                enabled: true,
+                interval_us,
+                ..Task::default()
+            });
             self.container.types.task_extensions.push(TaskExtension::default());
         }
     }
 
     fn head(&mut self, owner: Owner, parameters: Vec<LocalType>, results: Vec<ValueType>) -> FunctionId {
         let frame = if self.random.chance(35) { self.any_struct() } else { None };
-        let function = Function { owner, parameters: parameters.len() as u16, locals: parameters, results, frame, ..Function::default() };
+        let function = Function {
+            owner,
+            parameters: parameters.len() as u16,
+            locals: parameters,
+            results,
+            frame,
+            ..Function::default()
+        };
         self.container.functions.push(function);
         FunctionId(self.container.functions.len() as u16 - 1)
     }
@@ -326,7 +346,9 @@ impl World {
             self.container.parameters.startup_function = Some(self.head(Owner::None, Vec::new(), Vec::new()));
         }
         let programs = self.container.types.programs.len();
-        let entries: Vec<FunctionId> = (0..programs).map(|program| self.head(Owner::Program(ProgramId(program as u16)), Vec::new(), Vec::new())).collect();
+        let entries: Vec<FunctionId> = (0..programs)
+            .map(|program| self.head(Owner::Program(ProgramId(program as u16)), Vec::new(), Vec::new()))
+            .collect();
         for program in 0..programs {
             if self.random.chance(40) {
                 let (parameters, results) = (self.parameters(3), self.results());
@@ -443,7 +465,10 @@ impl World {
             };
             runs.push(InitRun { region: Region::Data, offset: variable.offset, repeat: 1, bytes });
         }
-        for (region, size) in [(Region::Memory, self.container.parameters.memory_image_bytes), (Region::Output, self.container.parameters.output_image_bytes)] {
+        for (region, size) in [
+            (Region::Memory, self.container.parameters.memory_image_bytes),
+            (Region::Output, self.container.parameters.output_image_bytes),
+        ] {
             if size > 0 && self.random.chance(60) {
                 let bytes = (0..size).map(|_| self.random.bits() as u8).collect();
                 runs.push(InitRun { region, offset: 0, repeat: 1, bytes });
@@ -455,7 +480,22 @@ impl World {
 
 /// A text of at most `capacity` bytes with its terminator: words that conversions know, or letters of few kinds, so that FIND finds.
 fn text(random: &mut Random, capacity: usize) -> Vec<u8> {
-    let words = ["12", "-7", "16#FF", "1.5E3", "TRUE", "T#1m30s", "t#2d_3.5h", "1e-400", "NaN", "-Infinity", "9999999999999999999", "2#1_0", "abcab", ""];
+    let words = [
+        "12",
+        "-7",
+        "16#FF",
+        "1.5E3",
+        "TRUE",
+        "T#1m30s",
+        "t#2d_3.5h",
+        "1e-400",
+        "NaN",
+        "-Infinity",
+        "9999999999999999999",
+        "2#1_0",
+        "abcab",
+        "",
+    ];
     let mut bytes = if random.chance(60) {
         random.one_of(words).as_bytes().to_vec()
     } else {

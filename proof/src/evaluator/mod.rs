@@ -291,7 +291,8 @@ impl Run<'_> {
                 Local::Bytes(bytes)
             }
             (LocalType::Ref(wanted), Item::Ref(at, found)) => {
-                let is_this_kind = found.target == wanted.target && (found.write || !wanted.write) && (wanted.image || !found.image);
+                let is_this_kind =
+                    found.target == wanted.target && (found.write || !wanted.write) && (wanted.image || !found.image);
                 assert!(is_this_kind, "{found} stored as {wanted}");
                 Local::Ref(at)
             }

@@ -30,7 +30,8 @@ pub(super) fn compute(op: NumericOp, operands: &[Value]) -> Result<Value, TrapCo
 
 /// Conversions name the other type, behind an underscore: `convert_i32_s`, `round_u8`.
 fn is_plain(name: &str) -> bool {
-    let conversions = ["convert", "demote", "promote", "round", "trunc", "reinterpret", "wrap", "saturate", "extend_i32"];
+    let conversions =
+        ["convert", "demote", "promote", "round", "trunc", "reinterpret", "wrap", "saturate", "extend_i32"];
     !conversions.iter().any(|prefix| name.starts_with(prefix))
 }
 
@@ -132,8 +133,20 @@ macro_rules! floats {
                 "neg" => $ty::from_bits(a.to_bits() ^ (1 << ($ty::WIDTH - 1))),
                 "abs" => $ty::from_bits(a.to_bits() & !(1 << ($ty::WIDTH - 1))),
                 "sqrt" => libm::$sqrt(a),
-                "min" => if b < a { b } else { a },
-                "max" => if b > a { b } else { a },
+                "min" => {
+                    if b < a {
+                        b
+                    } else {
+                        a
+                    }
+                }
+                "max" => {
+                    if b > a {
+                        b
+                    } else {
+                        a
+                    }
+                }
                 "sin" => libm::$sin(a),
                 "cos" => libm::$cos(a),
                 "tan" => libm::$tan(a),

@@ -295,14 +295,18 @@ impl Run<'_> {
         self.push_integer(ty, value);
         match control {
             ControlPlace::Slot(place, index) => self.known(&Instruction::SlotStore { place, index }),
-            ControlPlace::Bytes(place, offset) => self.known(&Instruction::Store { place, storage: ty.storage(), offset }),
+            ControlPlace::Bytes(place, offset) => {
+                self.known(&Instruction::Store { place, storage: ty.storage(), offset });
+            }
         }
     }
 
     fn control_value(&mut self, control: ControlPlace, ty: IntegerType) -> i64 {
         match control {
             ControlPlace::Slot(place, index) => self.known(&Instruction::SlotLoad { place, index }),
-            ControlPlace::Bytes(place, offset) => self.known(&Instruction::Load { place, storage: ty.storage(), offset }),
+            ControlPlace::Bytes(place, offset) => {
+                self.known(&Instruction::Load { place, storage: ty.storage(), offset });
+            }
         }
         self.pop_integer(ty)
     }
@@ -339,7 +343,11 @@ impl Run<'_> {
         });
         self.set_control(descriptor.control, ty, control.wrapping_add(kept[1]));
         let (control, bound, step) = (ordered(ty, control), ordered(ty, kept[0]), i128::from(kept[1]));
-        if step > 0 { control <= bound && bound - control >= step } else { control >= bound && control - bound >= -step }
+        if step > 0 {
+            control <= bound && bound - control >= step
+        } else {
+            control >= bound && control - bound >= -step
+        }
     }
 
     fn call(&mut self, id: FunctionId, found: Option<u32>) -> Result<(), Stop> {
@@ -412,7 +420,10 @@ impl Run<'_> {
         let call = self.calls.pop().expect("a function runs");
         let results = &self.container.functions[call.function.index()].results;
         let found = self.stack[call.base..].iter().map(|item| item.stack_type());
-        assert!(found.eq(results.iter().map(|ty| StackType::Value(*ty))), "the stack holds other things than the results");
+        assert!(
+            found.eq(results.iter().map(|ty| StackType::Value(*ty))),
+            "the stack holds other things than the results"
+        );
         if let Some(caller) = self.calls.last_mut() {
             caller.at += 1;
         }

@@ -58,7 +58,7 @@ pub(super) fn apply(op: HelperOp, image: &mut [u8], places: &[StringPlace], valu
         HelperOp::StringLen => return Some(Value::I32(texts[0].len() as i32)),
         HelperOp::StringFind => return Some(Value::I32(find(&texts[0], &texts[1]))),
         HelperOp::StringCompare => return Some(Value::I32(texts[0].cmp(&texts[1]) as i32)),
-        HelperOp::StringToBool => return Some(Value::I32(i32::from(texts[0].to_ascii_uppercase() == b"TRUE"))),
+        HelperOp::StringToBool => return Some(Value::I32(i32::from(texts[0].eq_ignore_ascii_case(b"TRUE")))),
         _ => return eval_helper(op, image, places, values),
     };
     put(image, places[0], &result);
