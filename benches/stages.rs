@@ -8,6 +8,7 @@ use khz_bytecode::limits::MAX_IMAGE_BYTES;
 use khz_bytecode::verify::verify;
 use khz_frontend::CompileOptions;
 use khz_machine::engine::{DeadlineCell, Entry, Limits};
+use khz_scheduler::{Hooks, LoadOptions, NoInputs, NoIo, NoObserver, Resource, VirtualClock};
 use kilohertz::pipeline::EngineKind;
 use programs::{EMPTY, PID, ladder, program, source};
 
@@ -63,10 +64,35 @@ fn scans(c: &mut Criterion) {
     }
 }
 
+/// A whole scheduling round on the virtual clock: selection, the scan, statistics, the next wake.
+fn rounds(c: &mut Criterion) {
+    let program = program(EMPTY);
+    let layout = program.layout(MAX_IMAGE_BYTES).expect("it fits");
+    for kind in EngineKind::BOTH {
+        let engine = program.engine(kind, &layout, false).expect("it compiles");
+        let holder = std::sync::Arc::clone(&program.verified);
+        let resource = Resource::load(holder, engine, Box::new(VirtualClock::new()), &LoadOptions::default());
+        let mut state = resource.expect("it loads").start().ok();
+        let (mut io, mut inputs, mut observer) = (NoIo, NoInputs, NoObserver);
+        let mut round = || {
+            let mut hooks = Hooks { io: &mut io, inputs: &mut inputs, observer: &mut observer };
+            let running = state.take().expect("it runs");
+            let (mut running, _) = running.run_round(&mut hooks).map_err(|f| f.report().trap).expect("no trap");
+            let wake = running.next_wake(&mut hooks);
+            running.wait(wake);
+            state = Some(running);
+        };
+        (0..10).for_each(|_| round());
+        c.bench_function(&format!("round/empty_{kind:?}").to_lowercase(), |b| b.iter(&mut round));
+        let statistics = state.expect("it runs").statistics();
+        assert!(statistics.tasks[0].scans >= 10 && statistics.rounds == statistics.tasks[0].scans);
+    }
+}
+
 #[allow(missing_docs, reason = "the macro makes a public function")]
 mod group {
-    use super::{containers, engines, frontend, scans};
-    criterion::criterion_group!(benches, frontend, containers, engines, scans);
+    use super::{containers, engines, frontend, rounds, scans};
+    criterion::criterion_group!(benches, frontend, containers, engines, scans, rounds);
 }
 
 criterion_main!(group::benches);
