@@ -54,7 +54,8 @@ pub struct Facts {
     /// Offset in the data region of each program instance's data block; `None` when its type has none.
     pub instance_blocks: Vec<Option<u32>>,
     /// Whether a float in the data region or frame may be another NaN than the one: some reference made from an integer may write, a union
-    /// has a float, or a block copy may bring bytes out of %I, %Q or %M. Then typed float loads from there canonicalise.
+    /// has a float, a block copy may bring bytes out of %I, %Q or %M, or the copy of a base type may cut a float of a derived one. Then typed
+    /// float loads from there canonicalise.
     pub foreign_floats: bool,
     /// Size in bytes of the memory image by region, for the budget that `khz verify` prints.
     pub image_bytes: u64,

@@ -100,7 +100,8 @@ fn examine(container: &Container) -> Check<Facts> {
     let frame_size = |function: &crate::container::Function| function.frame.map_or(0, |frame| types.size(frame));
     calls::close(container, &drafts, frame_size, &mut functions)?;
     prove_for_loops(&scopes, &drafts, &mut functions);
-    let foreign_floats = drafts.iter().any(|draft| draft.foreign_floats) || types.union_with_float();
+    let foreign_floats =
+        drafts.iter().any(|draft| draft.foreign_floats) || types.union_with_float() || types.base_ends_in_float();
     Ok(Facts {
         functions,
         type_extents: types.into_extents(),

@@ -276,6 +276,18 @@ impl<'c> TypeTable<'c> {
         unions.any(|(_, traits)| traits.has_float)
     }
 
+    /// Whether a base type may end inside a float of a type that derives from it: copying the base then moves half of that float.
+    pub(super) fn base_ends_in_float(&self) -> bool {
+        self.section.types.iter().any(|ty| {
+            let Type::Block { record, base: Some(base), .. } = ty else { return false };
+            let end = self.size(*base);
+            record.fields.iter().any(|field| {
+                let inside = field.offset < end && field.offset.saturating_add(self.size(field.ty)) > end;
+                inside && self.has_float(field.ty)
+            })
+        })
+    }
+
     /// The extents, for the facts.
     pub(super) fn into_extents(self) -> Vec<Extent> {
         self.extents
