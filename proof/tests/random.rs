@@ -1,18 +1,22 @@
-//! Random programs in all engines.
+//! Random programs in all engines, and that they reach everything.
 
 mod common;
 
 use std::sync::Arc;
 
+use khz_bytecode::trap::TrapCode;
 use khz_proof::bytecode::generate;
 use khz_proof::oracle::{Plan, compare};
 use khz_proof::statistics::Statistics;
+
+/// How many programs; `examples/compare.rs` runs more.
+const PROGRAMS: u64 = 1000;
 
 #[test]
 fn random_programs_do_the_same_in_every_engine() {
     let mut statistics = Statistics::default();
     let makers = common::makers();
-    for seed in 0..1500 {
+    for seed in 0..PROGRAMS {
         let verified = Arc::new(generate(seed));
         let plan = Plan { seed, ..Plan::default() };
         let difference = compare(&verified, &makers, &plan, &mut statistics).difference();
@@ -20,5 +24,16 @@ fn random_programs_do_the_same_in_every_engine() {
             panic!("seed {seed}: {}", difference.description);
         }
     }
-    println!("{}", statistics.report());
+    let report = statistics.report();
+    assert_eq!(statistics.executed.rare(20), Vec::<&str>::new(), "every instruction runs: {report}");
+    for code in TrapCode::ALL {
+        assert!(statistics.executed.trap_count(*code) >= 20, "every trap happens: {report}");
+    }
+    for (feature, count) in &statistics.features {
+        assert!(*count >= PROGRAMS / 50, "programs with {feature} are common: {report}");
+    }
+    assert!(
+        statistics.without_fuel * 2 > PROGRAMS && statistics.trapped * 10 < statistics.runs * 8,
+        "most programs end: {report}"
+    );
 }
