@@ -7,8 +7,10 @@ use std::collections::BTreeSet;
 use crate::analysis;
 use crate::diagnostics::{Diagnostic, has_errors, tidy};
 use crate::lower;
-use crate::source::{FileId, SourceMap};
+use crate::source::{FileId, SourceMap, Span};
+use crate::syntax::ast::Ast;
 use crate::syntax::parser::parse;
+use crate::testing::{CompiledTest, TestCompilation, desugar};
 
 /// Name of the file that holds the standard function blocks a program uses.
 pub const STANDARD_FILE: &str = "<standard>";
@@ -66,26 +68,39 @@ pub struct Compilation {
 
 /// Compiles sources, in their order, to one container for each RESOURCE.
 pub fn compile(sources: &[SourceInput], options: &CompileOptions) -> Compilation {
-    on_large_stack(sources, options, true)
+    on_large_stack(|| run(sources, options, true))
 }
 
-/// Finds everything there is to say about sources without making containers.
+/// Finds everything there is to say about sources, their unit tests included, without making containers.
 pub fn check(sources: &[SourceInput], options: &CompileOptions) -> Compilation {
-    on_large_stack(sources, options, false)
+    on_large_stack(|| run(sources, options, false))
 }
 
-fn on_large_stack(sources: &[SourceInput], options: &CompileOptions, lowers: bool) -> Compilation {
+/// Compiles the unit tests of sources ([`crate::testing`]).
+pub fn compile_tests(sources: &[SourceInput], options: &CompileOptions) -> TestCompilation {
+    on_large_stack(|| run_tests(sources, options))
+}
+
+fn on_large_stack<T: Send>(work: impl Fn() -> T + Sync) -> T {
     std::thread::scope(|scope| {
         let builder = std::thread::Builder::new().name("khz-frontend".to_owned()).stack_size(STACK_BYTES);
-        match builder.spawn_scoped(scope, || run(sources, options, lowers)) {
+        match builder.spawn_scoped(scope, &work) {
             Ok(thread) => thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)),
             // No thread to be had: the caller's own stack does for programs of ordinary depth.
-            Err(_) => run(sources, options, lowers),
+            Err(_) => work(),
         }
     })
 }
 
-fn run(inputs: &[SourceInput], options: &CompileOptions, lowers: bool) -> Compilation {
+/// Sources, read.
+struct Parsed {
+    sources: SourceMap,
+    standard: Option<FileId>,
+    ast: Ast,
+    diagnostics: Vec<Diagnostic>,
+}
+
+fn read(inputs: &[SourceInput]) -> Parsed {
     let mut sources = SourceMap::new();
     let mut diagnostics = Vec::new();
     for input in inputs {
@@ -95,6 +110,11 @@ fn run(inputs: &[SourceInput], options: &CompileOptions, lowers: bool) -> Compil
     let standard = add_standard_blocks(&mut sources);
     let (ast, found) = parse(&sources);
     diagnostics.extend(found);
+    Parsed { sources, standard, ast, diagnostics }
+}
+
+fn run(inputs: &[SourceInput], options: &CompileOptions, lowers: bool) -> Compilation {
+    let Parsed { sources, standard, mut ast, mut diagnostics } = read(inputs);
     let (project, found) = analysis::analyze(&ast, options.dialect, standard);
     diagnostics.extend(found);
     let mut resources = Vec::new();
@@ -110,7 +130,48 @@ fn run(inputs: &[SourceInput], options: &CompileOptions, lowers: bool) -> Compil
             resources.clear();
         }
     }
+    if !lowers && desugar::has_tests(&ast) {
+        let (units, found) = desugar::desugar(&mut ast);
+        diagnostics.extend(found);
+        let (_, _, found) = analysis::analyze_tests(&ast, options.dialect, standard, &units);
+        // What is wrong outside of the tests has been found already.
+        let mut seen: BTreeSet<(Span, &str, String)> = BTreeSet::new();
+        seen.extend(diagnostics.iter().map(|found| (found.span, found.code(), found.message.clone())));
+        diagnostics.extend(found.into_iter().filter(|found| !seen.contains(&(found.span, found.code(), found.message.clone()))));
+    }
     Compilation { resources, diagnostics: tidy(diagnostics), sources }
+}
+
+fn run_tests(inputs: &[SourceInput], options: &CompileOptions) -> TestCompilation {
+    let Parsed { sources, standard, mut ast, mut diagnostics } = read(inputs);
+    let (units, found) = desugar::desugar(&mut ast);
+    diagnostics.extend(found);
+    let (project, findings, found) = analysis::analyze_tests(&ast, options.dialect, standard, &units);
+    // Each test's resource checks what it reaches: a mistake there is found once for each.
+    let mut seen: BTreeSet<(Span, &str, String)> = BTreeSet::new();
+    diagnostics.extend(found.into_iter().filter(|found| seen.insert((found.span, found.code(), found.message.clone()))));
+    let mut tests = Vec::new();
+    if !has_errors(&diagnostics) {
+        let hashes = lower::Hashes::of(inputs, &sources);
+        for ((unit, plan), found) in units.iter().zip(&project.resources).zip(findings) {
+            // The runner finds operands by their names, so the debug section stays.
+            match lower::lower(&project, plan, &ast.names, &sources, &hashes, false) {
+                Ok(container) => tests.push(CompiledTest {
+                    name: unit.name.clone(),
+                    span: unit.span,
+                    has_teardown: unit.has_teardown,
+                    container,
+                    failed: found.failed,
+                    assertions: found.assertions,
+                }),
+                Err(found) => diagnostics.push(*found),
+            }
+        }
+        if has_errors(&diagnostics) {
+            tests.clear();
+        }
+    }
+    TestCompilation { tests, diagnostics: tidy(diagnostics), sources }
 }
 
 /// Adds a file with the standard function blocks whose names occur in the sources.

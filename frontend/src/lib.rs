@@ -11,6 +11,7 @@
 //!   for what is wrong are then ours to word, and what is wrong in one place need not spoil the next).
 //! - `analysis` finds out what names mean and makes the typed tree: every type and every conversion stands in it.
 //! - `lower` makes instructions of the typed tree; it never sees the syntax tree.
+//! - [`testing`] makes programs of unit tests, which only [`compile_tests`] looks at.
 //! - [`compile()`] is all of it; [`check`] stops before the instructions.
 //! - [`diagnostics`] is one table of everything that can be said about a program.
 //!
@@ -43,6 +44,9 @@ pub mod format;
 mod lower;
 pub mod source;
 pub mod syntax;
+pub mod testing;
 
-pub use compile::{Compilation, CompileOptions, CompiledResource, Dialect, SourceInput, check, compile};
+pub use compile::{
+    Compilation, CompileOptions, CompiledResource, Dialect, SourceInput, check, compile, compile_tests,
+};
 pub use syntax::parser::parse;

@@ -120,6 +120,9 @@ impl<'a> Checker<'_, 'a> {
                 return None;
             }
             Callee::Standard(name) => {
+                if let Some(found) = self.test_statement(&name, args, span) {
+                    return found;
+                }
                 let found = self.standard_call(&name, args, span, Ty::Void);
                 let found = self.settle(found, Ty::Void);
                 if found.ty == Ty::Error {

@@ -16,6 +16,9 @@ use crate::syntax::ast::{
 };
 use crate::syntax::symbol::Symbol;
 
+/// Where %I lies in %M when tests are compiled, in bytes.
+const TEST_INPUTS: u64 = 32_768;
+
 impl<'a> Analyzer<'a> {
     /// Collects all names, then resolves all declarations.
     pub(super) fn declare(&mut self) {
@@ -395,7 +398,9 @@ impl<'a> Analyzer<'a> {
 
     /// The place that a direct address means: `%IX3.5` bit 5 of byte 3, `%IW1` bytes 2 and 3, `%ID1` bytes 4 to 7.
     pub(super) fn address(&mut self, address: &DirectAddress) -> Option<Located> {
+        let in_test = self.tests.is_some();
         let place = match address.area {
+            Area::Input if in_test => BytePlace::Memory,
             Area::Input => BytePlace::Input,
             Area::Output => BytePlace::Output,
             Area::Memory => BytePlace::Memory,
@@ -413,7 +418,15 @@ impl<'a> Analyzer<'a> {
             self.report(&rules::BAD_ADDRESS, address.span, message);
             return None;
         };
+        // A test writes the inputs of what it tests: they are memory then, behind the program's own.
+        let offset = if in_test && address.area == Area::Input { offset + TEST_INPUTS } else { offset };
+        let too_high = in_test && address.area == Area::Memory && offset + 8 > TEST_INPUTS;
         match u32::try_from(offset) {
+            Ok(_) if too_high => {
+                let message = format!("where there are tests, %M ends at byte {}", TEST_INPUTS - 1);
+                self.report(&rules::BAD_ADDRESS, address.span, message);
+                None
+            }
             Ok(offset) if offset + size.bits().div_ceil(8) <= u32::from(u16::MAX) => {
                 Some(Located { place, offset, bit })
             }

@@ -7,6 +7,7 @@ use khz_bytecode::container::ElementaryType as E;
 
 use super::Analyzer;
 use super::fold::{self, Unfolded};
+use super::testing::TestBody;
 use super::tree::{BinOp, Expr, ExprKind, GlobalId, PouId, PouInfo, Root, UnOp, Usage};
 use super::types::{BOOL, Const, Ty, TyKind, Value, is_bits, is_duration, is_integer, is_real, is_signed, is_unsigned};
 use crate::diagnostics::{semantic as names, types as rules};
@@ -28,6 +29,8 @@ pub(super) struct Checker<'c, 'a> {
     pub(super) usage: Usage,
     pub(super) callees: BTreeMap<PouId, Span>,
     pub(super) loop_depth: u32,
+    /// Present in the body of a test.
+    pub(super) test: Option<Box<TestBody>>,
 }
 
 /// An expression that could not be understood; it was reported.
@@ -46,12 +49,14 @@ impl<'c, 'a> Checker<'c, 'a> {
             usage: Usage::default(),
             callees: BTreeMap::new(),
             loop_depth: 0,
+            test: None,
         }
     }
 
     /// For the body of a unit, with the globals that it sees.
     pub(super) fn body(an: &'c mut Analyzer<'a>, pou: Option<PouId>, environment: &'c Environment) -> Self {
         let info = pou.and_then(|pou| an.info(pou));
+        let test = an.test_body(pou);
         Checker {
             an,
             pou,
@@ -60,6 +65,7 @@ impl<'c, 'a> Checker<'c, 'a> {
             usage: Usage::default(),
             callees: BTreeMap::new(),
             loop_depth: 0,
+            test,
         }
     }
 

@@ -23,6 +23,7 @@ mod spec;
 mod standard;
 mod stmt;
 mod tasks;
+mod testing;
 
 use std::collections::BTreeMap;
 use std::rc::Rc;
@@ -34,6 +35,7 @@ use crate::diagnostics::{Diagnostic, Rule, Severity, semantic as rules};
 use crate::source::{FileId, Span};
 use crate::syntax::ast::{Ast, Ident, Pou, TypeDecl, VarDecl, VarSection};
 use crate::syntax::symbol::Symbol;
+use crate::testing::{TestFindings, TestUnit};
 
 /// How deep declarations may depend on one another (a constant on a constant, a type on a type).
 const MAX_DEPENDENCE: u32 = 200;
@@ -47,6 +49,24 @@ pub fn analyze(ast: &Ast, dialect: Dialect, standard: Option<FileId>) -> (Projec
     let resources = analyzer.check_bodies(resources);
     let pous = analyzer.pous.into_iter().flatten().collect();
     (Project { types: analyzer.types, pous, globals: analyzer.globals, resources }, analyzer.diagnostics)
+}
+
+/// The same for the PROGRAMs that tests were made to: a resource for each, in their order, and what was found in it.
+pub fn analyze_tests(
+    ast: &Ast,
+    dialect: Dialect,
+    standard: Option<FileId>,
+    units: &[TestUnit],
+) -> (Project, Vec<TestFindings>, Vec<Diagnostic>) {
+    let mut analyzer = Analyzer::new(ast, dialect, standard);
+    analyzer.tests = Some(testing::Tests::new(units));
+    analyzer.declare();
+    let resources = analyzer.configure_tests(units);
+    let resources = analyzer.check_bodies(resources);
+    let mut tests = analyzer.tests.take().unwrap_or_default();
+    let findings = units.iter().map(|unit| tests.take(unit)).collect();
+    let pous = analyzer.pous.into_iter().flatten().collect();
+    (Project { types: analyzer.types, pous, globals: analyzer.globals, resources }, findings, analyzer.diagnostics)
 }
 
 /// For how many unknown names a known one is looked for that may have been meant.
@@ -104,6 +124,8 @@ struct Analyzer<'a> {
     global_decls: Vec<GlobalDecl<'a>>,
     depth: u32,
     suggestions: u32,
+    /// Present when tests are compiled.
+    tests: Option<testing::Tests>,
 }
 
 /// A global as declared.
@@ -137,6 +159,7 @@ impl<'a> Analyzer<'a> {
             global_decls: Vec::new(),
             depth: 0,
             suggestions: 0,
+            tests: None,
         }
     }
 

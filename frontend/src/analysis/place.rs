@@ -201,7 +201,8 @@ impl<'a> Checker<'_, 'a> {
             _ => None,
         };
         let at = self.an.field_position(&fields, member.symbol);
-        if let Some(pou) = block {
+        // A test looks inside of what it tests.
+        if let Some(pou) = block.filter(|_| self.test.is_none()) {
             let class = self.an.info(pou).and_then(|info| {
                 info.vars.iter().find(|var| var.symbol == member.symbol).map(|var| (var.class, info.name.clone()))
             });
@@ -325,7 +326,10 @@ impl<'a> Checker<'_, 'a> {
         };
         let input = self.root_location(place.root).is_some_and(|located| located.place == BytePlace::Input);
         let refusal = refusal.or_else(|| input.then(|| ("%I is read-only for programs".to_owned(), None)));
-        let refusal = refusal.or_else(|| self.refuse_output(place).map(|message| (message, None)));
+        let refusal = refusal.or_else(|| {
+            let refused = if self.test.is_none() { self.refuse_output(place) } else { None };
+            refused.map(|message| (message, None))
+        });
         let Some((message, declared)) = refusal else { return true };
         let mut found = Diagnostic::new(&names::NOT_WRITABLE, place.span, message);
         if let Some(declared) = declared {

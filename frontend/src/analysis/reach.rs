@@ -72,6 +72,9 @@ impl<'a> Analyzer<'a> {
         let statements = checker.block(&decl.body);
         let callees = std::mem::take(&mut checker.callees).into_iter().collect();
         let usage = std::mem::take(&mut checker.usage);
+        if let Some(test) = checker.test.take() {
+            self.finish_test(pou, *test);
+        }
         (Body { statements, callees }, usage)
     }
 
@@ -134,7 +137,8 @@ impl<'a> Analyzer<'a> {
 
     /// Gives each resource its globals; refuses that two resources use one.
     fn share_globals(&mut self, plans: &mut [ResourcePlan]) {
-        let alone = plans.len() <= 1;
+        // Tests run one after the other, each with all globals anew.
+        let alone = plans.len() <= 1 || self.tests.is_some();
         let mut users: BTreeMap<GlobalId, usize> = BTreeMap::new();
         let mut clashes = Vec::new();
         for (at, plan) in plans.iter_mut().enumerate() {

@@ -4,9 +4,10 @@ use khz_bytecode::container::ElementaryType as E;
 use khz_machine::library::functions::{self, FunctionRow, ResultRule, StandardFunction as F, TypeClass};
 
 use super::expr::{Checker, broken};
+use super::testing::is_test_word;
 use super::tree::{BinOp, Expr, ExprKind, TextOp, UnOp};
 use super::types::{BOOL, Const, DINT, INT, Ty, elementary_by_name, is_bits, is_duration, is_integer, is_real};
-use crate::diagnostics::{semantic as names, types as rules};
+use crate::diagnostics::{Diagnostic, semantic as names, types as rules};
 use crate::source::Span;
 use crate::syntax::ast::{self, Arg, ArgKind, Ident};
 
@@ -28,6 +29,10 @@ impl<'a> Checker<'_, 'a> {
         if self.find_variable(name.symbol).is_some() {
             let message = format!("`{}` is a variable that can not be called", self.an.spelling(name));
             self.an.report(&names::NOT_CALLABLE, name.span, message);
+        } else if is_test_word(text) {
+            let message = format!("there is no function `{}`", self.an.spelling(name));
+            let found = Diagnostic::new(&names::UNKNOWN_NAME, name.span, message);
+            self.an.push(found.help("it means something only in a TEST, and as a statement"));
         } else {
             let message = format!("there is no function `{}`", self.an.spelling(name));
             self.an.report_unknown(&names::UNKNOWN_NAME, name, message, known.into_iter());

@@ -18,6 +18,7 @@ impl<'a> Checker<'_, 'a> {
         let mut warned = false;
         for statement in &block.statements {
             let found = self.statement(statement);
+            let before = self.take_pending();
             if ended {
                 if !warned && !matches!(statement.kind, ast::StmtKind::Empty) {
                     self.an.report(&names::UNREACHABLE, statement.span, "nothing ever gets here");
@@ -26,6 +27,7 @@ impl<'a> Checker<'_, 'a> {
                 continue;
             }
             if let Some(found) = found {
+                list.extend(before);
                 ended = matches!(found.kind, StmtKind::Return | StmtKind::Exit | StmtKind::Continue);
                 list.push(found);
             }

@@ -39,7 +39,7 @@ pub struct Project {
 }
 
 /// The declaration of a program organisation unit.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct PouInfo {
     /// Program, function or function block.
     pub kind: PouKind,

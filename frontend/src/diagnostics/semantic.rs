@@ -206,4 +206,14 @@ rules! {
         wrong ""
         right ""
     }
+    ASSERTION = "S0060" Error "a wrong assertion" {
+        "Assertions compare values that meet in one type, arrays and structures only with EQ, NEQ and their like. Each takes its operands and, last, a message. ADVANCE_TIME takes a TIME or a number of nanoseconds."
+        wrong "FUNCTION Half : INT\nVAR_INPUT\n  x : INT;\nEND_VAR\n  Half := x / 2;\nEND_FUNCTION\nPROGRAM p\nEND_PROGRAM\nTEST 'half'\n  ASSERT_EQ(Half(8));\nEND_TEST\n"
+        right "FUNCTION Half : INT\nVAR_INPUT\n  x : INT;\nEND_VAR\n  Half := x / 2;\nEND_FUNCTION\nPROGRAM p\nEND_PROGRAM\nTEST 'half'\n  ASSERT_EQ(Half(8), 4);\nEND_TEST\n"
+    }
+    MOCK = "S0061" Error "nothing to mock" {
+        "MOCK names an instance of a function block (or of a program), MOCK_FUNCTION a FUNCTION of the sources that has a result. Standard functions are what they are."
+        wrong "PROGRAM p\nEND_PROGRAM\nTEST 'pump'\nVAR\n  speed : INT;\nEND_VAR\n  MOCK speed;\nEND_TEST\n"
+        right "FUNCTION_BLOCK Pump\nEND_FUNCTION_BLOCK\nPROGRAM p\nEND_PROGRAM\nTEST 'pump'\nVAR\n  pump1 : Pump;\nEND_VAR\n  MOCK pump1;\nEND_TEST\n"
+    }
 }
