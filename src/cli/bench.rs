@@ -38,6 +38,9 @@ pub struct Figures {
 
 /// Runs it.
 pub fn run(args: &BenchArgs) -> Outcome {
+    if args.resource.inputs.is_some() && !args.jitter {
+        return Err(Failure::usage("--inputs goes with --jitter: timed scans leave the inputs out"));
+    }
     let frontend_ns = frontend_ns(args)?;
     let program = choose(load(&args.sources)?, args.resource.resource.as_deref())?;
     let session = Session::new(program, &args.resource);

@@ -42,7 +42,7 @@ fn print(program: &Program, format: Format) -> Result<(), Failure> {
         facts.functions.len()
     ));
     people(&format!(
-        "  {} loops, all reducible; {for_loops} FOR loops, of {proven} the control variable is proven",
+        "  {} loops, all reducible; {for_loops} of them FOR loops, {proven} with a proven control variable",
         loops().count()
     ));
     people(&format!("  {} tasks, {} program instances", tasks.tasks.len(), tasks.instances.len()));
