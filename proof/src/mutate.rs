@@ -355,15 +355,15 @@ impl Sizes {
 }
 
 fn spoil_instruction(random: &mut Random, instruction: &mut Instruction, sizes: &Sizes, length: usize) {
-    let places = [SlotPlace::Global, SlotPlace::Program, SlotPlace::Local];
     match instruction {
-        Instruction::Numeric(op) => *op = other_row(random, *op),
+        Instruction::Numeric(op) => {
+            let fits = |row: &NumericOp| row.operands() == op.operands() && row.result() == op.result();
+            let rows: Vec<NumericOp> = NumericOp::ALL.iter().copied().filter(fits).collect();
+            *op = rows[random.below(rows.len())];
+        }
         Instruction::Helper(op, capacities) => {
-            let rows: Vec<HelperOp> = HelperOp::ALL
-                .iter()
-                .copied()
-                .filter(|row| row.operands() == op.operands() && row.result() == op.result())
-                .collect();
+            let fits = |row: &HelperOp| row.operands() == op.operands() && row.result() == op.result();
+            let rows: Vec<HelperOp> = HelperOp::ALL.iter().copied().filter(fits).collect();
             *op = rows[random.below(rows.len())];
             if random.chance(15) {
                 capacities[0] = nudge(random, i64::from(capacities[0])) as u16;
@@ -371,40 +371,6 @@ fn spoil_instruction(random: &mut Random, instruction: &mut Instruction, sizes: 
         }
         Instruction::ConstI32 { value } => *value = nudge(random, i64::from(*value)) as i32,
         Instruction::Const { id } => *id = ConstantId(below16(random, sizes.constants)),
-        Instruction::SlotLoad { place, index } | Instruction::SlotStore { place, index } => {
-            if random.chance(30) {
-                *place = random.one_of(places);
-            }
-            *index = SlotIndex(below16(random, sizes.slots));
-        }
-        Instruction::Load { place, storage, offset } | Instruction::Store { place, storage, offset } => {
-            match random.below(3) {
-                0 => *place = BytePlace::ALL[random.below(BytePlace::ALL.len())],
-                1 => *storage = Storage::ALL[random.below(Storage::ALL.len())],
-                _ => *offset = nudge(random, i64::from(*offset)) as u32,
-            }
-        }
-        Instruction::LoadBit { place, offset, bit } | Instruction::StoreBit { place, offset, bit } => {
-            match random.below(3) {
-                0 => *place = BytePlace::ALL[random.below(BytePlace::ALL.len())],
-                1 => *offset = nudge(random, i64::from(*offset)) as u32,
-                _ => *bit = random.below(8) as u8,
-            }
-        }
-        Instruction::Address { place, offset, target } => match random.below(3) {
-            0 => *place = BytePlace::ALL[random.below(BytePlace::ALL.len())],
-            1 => *offset = nudge(random, i64::from(*offset)) as u32,
-            _ => *target = TypeId(below16(random, sizes.types)),
-        },
-        Instruction::RefField { field, .. } => *field = below16(random, 4),
-        Instruction::RefIndex { array } => *array = ArrayId(below16(random, sizes.arrays)),
-        Instruction::RefCheck { target, write } => {
-            if random.chance(50) {
-                *write = !*write;
-            } else {
-                *target = TypeId(below16(random, sizes.types));
-            }
-        }
         Instruction::CheckI32 { kind, lower, upper } => match random.below(3) {
             0 => *kind = IntegerType::ALL[random.below(6)],
             1 => *lower = nudge(random, i64::from(*lower)) as i32,
@@ -418,13 +384,55 @@ fn spoil_instruction(random: &mut Random, instruction: &mut Instruction, sizes: 
             *target = Label(random.below(length) as u32);
         }
         Instruction::Switch { targets } => {
-            let other = targets[random.below(targets.len())];
-            let count = targets.len();
-            targets[random.below(count)] = other;
+            let (from, to) = (random.below(targets.len()), random.below(targets.len()));
+            targets[to] = targets[from];
         }
         Instruction::ForEnter { exit, .. } => *exit = Label(random.below(length) as u32),
         Instruction::Call { function } => *function = FunctionId(below16(random, sizes.functions)),
         Instruction::CallVirtual { method } => *method = MethodId(below16(random, sizes.methods)),
+        other => spoil_access(random, other, sizes),
+    }
+}
+
+/// Memory and reference instructions; what has no operand becomes another instruction without one.
+fn spoil_access(random: &mut Random, instruction: &mut Instruction, sizes: &Sizes) {
+    let any_place = |random: &mut Random| BytePlace::ALL[random.below(BytePlace::ALL.len())];
+    let near = |random: &mut Random, offset: u32| nudge(random, i64::from(offset)) as u32;
+    match instruction {
+        Instruction::SlotLoad { place, index } | Instruction::SlotStore { place, index } => {
+            if random.chance(30) {
+                *place = random.one_of([SlotPlace::Global, SlotPlace::Program, SlotPlace::Local]);
+            }
+            *index = SlotIndex(below16(random, sizes.slots));
+        }
+        Instruction::Load { place, storage, offset } | Instruction::Store { place, storage, offset } => {
+            match random.below(3) {
+                0 => *place = any_place(random),
+                1 => *storage = Storage::ALL[random.below(Storage::ALL.len())],
+                _ => *offset = near(random, *offset),
+            }
+        }
+        Instruction::LoadBit { place, offset, bit } | Instruction::StoreBit { place, offset, bit } => {
+            match random.below(3) {
+                0 => *place = any_place(random),
+                1 => *offset = near(random, *offset),
+                _ => *bit = random.below(8) as u8,
+            }
+        }
+        Instruction::Address { place, offset, target } => match random.below(3) {
+            0 => *place = any_place(random),
+            1 => *offset = near(random, *offset),
+            _ => *target = TypeId(below16(random, sizes.types)),
+        },
+        Instruction::RefField { field, .. } => *field = below16(random, 4),
+        Instruction::RefIndex { array } => *array = ArrayId(below16(random, sizes.arrays)),
+        Instruction::RefCheck { target, write } => {
+            if random.chance(50) {
+                *write = !*write;
+            } else {
+                *target = TypeId(below16(random, sizes.types));
+            }
+        }
         _ => {
             *instruction = match random.below(3) {
                 0 => Instruction::Nop {},
@@ -433,14 +441,4 @@ fn spoil_instruction(random: &mut Random, instruction: &mut Instruction, sizes: 
             };
         }
     }
-}
-
-/// Another row with the same operands and result, if there is one.
-fn other_row(random: &mut Random, op: NumericOp) -> NumericOp {
-    let rows: Vec<NumericOp> = NumericOp::ALL
-        .iter()
-        .copied()
-        .filter(|row| row.operands() == op.operands() && row.result() == op.result())
-        .collect();
-    rows[random.below(rows.len())]
 }

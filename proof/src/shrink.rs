@@ -43,6 +43,8 @@ impl Shrinker<'_> {
             self.attempt(&mut best, drop_unused_constants);
             for function in 0..best.container().functions.len() {
                 self.delete_ranges(&mut best, function);
+                self.decide(&mut best, function);
+                self.delete_pairs(&mut best, function);
                 self.simplify(&mut best, function);
             }
             if weight(best.container()) >= before || self.tries == 0 {
@@ -160,6 +162,61 @@ impl Shrinker<'_> {
         }
     }
 
+    /// Deletes what pushes a value and, further on, the `drop` that takes it away; what computes with values becomes drops first.
+    fn delete_pairs(&mut self, best: &mut Verified, function: usize) {
+        const FARTHEST: usize = 12;
+        let mut at = 0;
+        while let Some(instruction) = instructions_of(&best.container().functions[function]).get(at).cloned() {
+            let spare = match instruction {
+                Instruction::Select {} => 2,
+                Instruction::Numeric(op) => op.operands().len() - 1,
+                Instruction::RefField { .. } => 0,
+                _ => usize::MAX,
+            };
+            if spare != usize::MAX {
+                self.attempt(best, |container| {
+                    change_code(&mut container.functions[function], |code| {
+                        code.splice(at..=at, (0..spare).map(|_| Instruction::Drop {}));
+                        (at, 1, spare)
+                    });
+                });
+            }
+            let code = instructions_of(&best.container().functions[function]);
+            let drops = (at + 1..code.len().min(at + FARTHEST)).filter(|other| code[*other] == Instruction::Drop {});
+            let deleted = drops.collect::<Vec<_>>().into_iter().any(|other| {
+                self.attempt(best, |container| {
+                    for gone in [other, at] {
+                        change_code(&mut container.functions[function], |code| {
+                            code.remove(gone);
+                            (gone, 1, 0)
+                        });
+                    }
+                })
+            });
+            at += usize::from(!deleted);
+        }
+    }
+
+    /// Takes one way at a branch for good; what is then not reached goes.
+    fn decide(&mut self, best: &mut Verified, function: usize) {
+        let mut at = 0;
+        while let Some(instruction) = instructions_of(&best.container().functions[function]).get(at).cloned() {
+            let ways = match instruction {
+                Instruction::JumpIf { .. } | Instruction::JumpUnless { .. } => 2,
+                Instruction::Switch { targets } => targets.len(),
+                _ => 0,
+            };
+            let decided = (0..ways).any(|way| {
+                self.attempt(best, |container| {
+                    let function = &mut container.functions[function];
+                    take_way(function, at, way);
+                    while drop_dead(function) {}
+                })
+            });
+            at += usize::from(!decided);
+        }
+    }
+
     /// Puts simpler instructions in the place of single ones, or of a run by a constant.
     fn simplify(&mut self, best: &mut Verified, function: usize) {
         self.attempt(best, |container| drop_unused_locals(&mut container.functions[function]));
@@ -249,6 +306,40 @@ pub(crate) fn change_code(
         }
     }
     function.code = encode(&mut code, |label| label.0 as usize);
+}
+
+/// Replaces a branch by a jump to target number `way`, or, for one beyond the targets, by going on behind it.
+fn take_way(function: &mut Function, at: usize, way: usize) {
+    change_code(function, |code| {
+        let jump = code[at].targets().get(way).map(|target| Instruction::Jump { target: *target });
+        let come = 1 + usize::from(jump.is_some());
+        code.splice(at..=at, std::iter::once(Instruction::Drop {}).chain(jump));
+        (at, 1, come)
+    });
+}
+
+/// Removes one run of instructions that nothing leads to, or a jump to the next instruction; false when there is none.
+fn drop_dead(function: &mut Function) -> bool {
+    let mut dropped = false;
+    change_code(function, |code| {
+        let mut reached = vec![false; code.len()];
+        let mut open = vec![0];
+        while let Some(at) = open.pop() {
+            let Some(instruction) = code.get(at).filter(|_| !std::mem::replace(&mut reached[at], true)) else {
+                continue;
+            };
+            open.extend(instruction.targets().iter().map(|target| target.0 as usize));
+            open.extend(Some(at + 1).filter(|next| instruction.falls_through() && *next < code.len()));
+        }
+        let is_idle = |at: usize| matches!(code[at], Instruction::Jump { target } if target.0 as usize == at + 1);
+        let Some(at) = (0..code.len()).find(|at| !reached[*at] || is_idle(*at)) else { return (0, 0, 0) };
+        let end = (at + 1..code.len()).find(|end| reached[*end]).unwrap_or(code.len());
+        let count = if reached[at] { 1 } else { end - at };
+        code.drain(at..at + count);
+        dropped = true;
+        (at, count, 0)
+    });
+    dropped
 }
 
 fn zero(container: &mut Container, ty: khz_bytecode::value::ValueType) -> Option<Instruction> {

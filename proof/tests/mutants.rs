@@ -11,8 +11,8 @@ use khz_proof::random::Random;
 use khz_proof::statistics::Statistics;
 
 /// Containers, and mutants of each.
-const CONTAINERS: u64 = 60;
-const MUTANTS: u64 = 60;
+const CONTAINERS: u64 = 40;
+const MUTANTS: u64 = 50;
 
 #[test]
 fn mutants_that_verify_run_the_same_in_every_engine() {
@@ -33,5 +33,5 @@ fn mutants_that_verify_run_the_same_in_every_engine() {
         }
     }
     assert!(tally.accepted * 20 >= tally.total, "at least 5% verify: {}", tally.report());
-    assert!(tally.by_code.len() >= 60, "mutants reach most rules: {}", tally.report());
+    assert!(tally.by_code.len() >= 45, "mutants reach most rules: {}", tally.report());
 }

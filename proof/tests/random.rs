@@ -5,12 +5,13 @@ mod common;
 use std::sync::Arc;
 
 use khz_bytecode::trap::TrapCode;
+use khz_jit::Passes;
 use khz_proof::bytecode::generate;
-use khz_proof::oracle::{Plan, compare};
+use khz_proof::oracle::{Maker, Plan, compare};
 use khz_proof::statistics::Statistics;
 
 /// How many programs; `examples/compare.rs` runs more.
-const PROGRAMS: u64 = 1000;
+const PROGRAMS: u64 = 600;
 
 #[test]
 fn random_programs_do_the_same_in_every_engine() {
@@ -36,4 +37,21 @@ fn random_programs_do_the_same_in_every_engine() {
         statistics.without_fuel * 2 > PROGRAMS && statistics.trapped * 10 < statistics.runs * 8,
         "most programs end: {report}"
     );
+}
+
+#[test]
+fn native_code_is_the_same_without_passes_and_with_each_alone() {
+    let none = common::native_with(Passes::NONE);
+    let alone: Vec<_> =
+        (Passes::NAMES.iter()).map(|name| (*name, common::native_with(Passes::NONE.with(name).unwrap()))).collect();
+    let mut makers = vec![Maker { name: "jit without passes", make: &none }];
+    makers.extend(alone.iter().map(|(name, make)| Maker { name, make }));
+    for seed in 20_000..20_040 {
+        let verified = Arc::new(generate(seed));
+        let plan = Plan { seed, ..Plan::default() };
+        let difference = compare(&verified, &makers, &plan, &mut Statistics::default()).difference();
+        if let Some(difference) = difference {
+            panic!("seed {seed}: {}", difference.description);
+        }
+    }
 }

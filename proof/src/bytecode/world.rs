@@ -362,7 +362,7 @@ impl World {
         for ty in 0..self.container.types.types.len() {
             self.make_methods(TypeId(ty as u16));
         }
-        for number in 0..self.random.one_of([1, 1, 2, 3]) {
+        for number in 0..self.random.one_of([1, 1, 2, 3, 1, 2, 6]) {
             let program = self.random.below(programs);
             let task = self.random.below(self.container.tasks.tasks.len());
             let slots = self.container.types.programs[program].slots.clone();

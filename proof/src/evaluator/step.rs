@@ -1,7 +1,7 @@
 //! One instruction.
 
 use khz_bytecode::container::{Constant, ControlPlace, Owner, Type};
-use khz_bytecode::ids::{FunctionId, Label, MethodId, SlotIndex, TypeId};
+use khz_bytecode::ids::{ArrayId, FunctionId, Label, MethodId, SlotIndex, TypeId};
 use khz_bytecode::instruction::{HelperOp, HelperOperand, Instruction, MAX_CAPACITIES};
 use khz_bytecode::limits::SLOT_BYTES;
 use khz_bytecode::trap::TrapCode;
@@ -177,22 +177,7 @@ impl Run<'_> {
                 let field = record.fields[usize::from(field)];
                 self.stack.push(Item::Ref(at + field.offset, RefType { target: field.ty, ..ty }));
             }
-            Instruction::RefIndex { array } => {
-                let descriptor = &self.container.types.arrays[array.index()];
-                let mut indices: Vec<i64> = descriptor.dimensions.iter().map(|_| i64::from(self.pop_i32())).collect();
-                indices.reverse();
-                let mut position = 0;
-                for (index, (lower, upper)) in indices.into_iter().zip(&descriptor.dimensions) {
-                    let (lower, upper) = (i64::from(*lower), i64::from(*upper));
-                    if index < lower || index > upper {
-                        return stop(TrapCode::ArrayIndex, [index, lower, upper]);
-                    }
-                    position = position * (upper - lower + 1) + (index - lower);
-                }
-                let (at, ty) = self.pop_ref();
-                let at = at + position as u32 * descriptor.stride;
-                self.stack.push(Item::Ref(at, RefType { target: descriptor.element, ..ty }));
-            }
+            Instruction::RefIndex { array } => self.ref_index(array)?,
             Instruction::RefToInt {} => {
                 let (at, _) = self.pop_ref();
                 let address = i64::from(at) - i64::from(self.layout.data.start);
@@ -217,6 +202,24 @@ impl Run<'_> {
             }
             _ => {}
         }
+        Ok(())
+    }
+
+    fn ref_index(&mut self, array: ArrayId) -> Result<(), Stop> {
+        let descriptor = &self.container.types.arrays[array.index()];
+        let mut indices: Vec<i64> = descriptor.dimensions.iter().map(|_| i64::from(self.pop_i32())).collect();
+        indices.reverse();
+        let mut position = 0;
+        for (index, (lower, upper)) in indices.into_iter().zip(&descriptor.dimensions) {
+            let (lower, upper) = (i64::from(*lower), i64::from(*upper));
+            if index < lower || index > upper {
+                return stop(TrapCode::ArrayIndex, [index, lower, upper]);
+            }
+            position = position * (upper - lower + 1) + (index - lower);
+        }
+        let (at, ty) = self.pop_ref();
+        let at = at + position as u32 * descriptor.stride;
+        self.stack.push(Item::Ref(at, RefType { target: descriptor.element, ..ty }));
         Ok(())
     }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use khz_bytecode::verify::Verified;
 use khz_interp::{Interpreter, InterpreterOptions};
-use khz_jit::{Jit, JitOptions};
+use khz_jit::{Jit, JitOptions, Passes};
 use khz_machine::engine::Engine;
 use khz_machine::image::ImageLayout;
 use khz_proof::oracle::Maker;
@@ -20,6 +20,15 @@ pub fn native(verified: Arc<Verified>, layout: &ImageLayout, fuel: bool) -> Resu
     let options = JitOptions { fuel, ..JitOptions::default() };
     let jit = Jit::new(verified, layout, options).map_err(|error| error.to_string())?;
     Ok(Box::new(jit))
+}
+
+/// Makes native code with only some passes.
+pub fn native_with(passes: Passes) -> impl Fn(Arc<Verified>, &ImageLayout, bool) -> Result<Box<dyn Engine>, String> {
+    move |verified, layout, fuel| {
+        let options = JitOptions { fuel, passes, ..JitOptions::default() };
+        let jit = Jit::new(verified, layout, options).map_err(|error| error.to_string())?;
+        Ok(Box::new(jit))
+    }
 }
 
 /// Every engine.
