@@ -1,6 +1,9 @@
 //! What holds for all programs of the repository and for what comes of them by changing tokens.
 
 use super::{check, parses, tokens};
+use khz_bytecode::container;
+use khz_frontend::compile::{CompileOptions, SourceInput, compile};
+use khz_frontend::diagnostics::has_errors;
 use khz_frontend::format::{FormatOptions, KeywordCase};
 use khz_frontend::syntax::lexer::{TokenKind, lex};
 use std::path::{Path, PathBuf};
@@ -51,6 +54,36 @@ fn every_program_keeps_its_tokens_and_its_layout() {
             check(name, text, options);
         }
     }
+}
+
+/// What a program compiles to, without the lines that the debug section names and the hash of its source; none if it
+/// has errors.
+fn compiled(text: &str) -> Option<Vec<Vec<u8>>> {
+    let input = SourceInput { name: "a.st".to_owned(), bytes: text.as_bytes().to_vec() };
+    let compilation = compile(&[input], &CompileOptions { strip: true, ..CompileOptions::default() });
+    (!has_errors(&compilation.diagnostics)).then(|| {
+        let containers = compilation.resources.into_iter().map(|resource| resource.container);
+        containers
+            .map(|mut container| {
+                container.source_hash = Default::default();
+                container::write(&container).expect("a program that fits")
+            })
+            .collect()
+    })
+}
+
+#[test]
+fn formatted_programs_compile_to_the_same_bytes() {
+    let mut programs_compiled = 0;
+    for (name, text) in &programs() {
+        let Some(before) = compiled(text) else { continue };
+        programs_compiled += usize::from(!before.is_empty());
+        for options in &all_options() {
+            let after = compiled(&check(name, text, options));
+            assert!(after.as_ref() == Some(&before), "{name}: formatting changed what the program is compiled to");
+        }
+    }
+    assert!(programs_compiled > 20, "only {programs_compiled} programs of the repository compile");
 }
 
 #[test]
