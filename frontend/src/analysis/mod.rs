@@ -224,19 +224,20 @@ impl<'a> Analyzer<'a> {
         // Looking through all names for each of very many unknown ones would take time in their product.
         self.suggestions += 1;
         let known = known.take(if self.suggestions <= MAX_SUGGESTIONS { usize::MAX } else { 0 });
-        let mut best: Option<(usize, &str)> = None;
-        for symbol in known {
+        let mut best: Option<(usize, &str, Symbol)> = None;
+        // A name that is known elsewhere but not here is no mistake of spelling.
+        for symbol in known.filter(|symbol| *symbol != ident.symbol) {
             let name = self.text(symbol);
             let limit = (wanted.len() / 3).clamp(1, 3);
             if let Some(distance) = edit_distance(wanted, name, limit)
-                && best.is_none_or(|found| (distance, name) < found)
+                && best.is_none_or(|found| (distance, name) < (found.0, found.1))
             {
-                best = Some((distance, name));
+                best = Some((distance, name, symbol));
             }
         }
         let mut found = Diagnostic::new(rule, ident.span, message);
-        if let Some((_, name)) = best {
-            found = found.help(format!("did you mean `{name}`?"));
+        if let Some((_, _, symbol)) = best {
+            found = found.help(format!("did you mean `{}`?", self.ast.names.text_as_written(symbol)));
         }
         self.push(found);
     }

@@ -4,7 +4,7 @@ use khz_bytecode::container::ElementaryType as E;
 use khz_bytecode::value::BytePlace;
 
 use super::expr::{Checker, broken};
-use super::tree::{Expr, ExprKind, GlobalId, Located, Place, Root, Step, VarClass, VarId};
+use super::tree::{Expr, ExprKind, GlobalId, Located, Place, PouId, Root, Step, VarClass, VarId};
 use super::types::{BOOL, Const, DINT, Ty, TyId, TyKind, is_bits, is_integer, widen};
 use crate::diagnostics::{Diagnostic, semantic as names, types as rules};
 use crate::source::Span;
@@ -201,8 +201,11 @@ impl<'a> Checker<'_, 'a> {
             _ => None,
         };
         let at = self.an.field_position(&fields, member.symbol);
-        // A test looks inside of what it tests.
-        if let Some(pou) = block.filter(|_| self.test.is_none()) {
+        if self.test.is_some() {
+            if let Some(found) = block.and_then(|pou| self.located_member(pou, member, span)) {
+                return Some(found);
+            }
+        } else if let Some(pou) = block {
             let class = self.an.info(pou).and_then(|info| {
                 info.vars.iter().find(|var| var.symbol == member.symbol).map(|var| (var.class, info.name.clone()))
             });
@@ -221,6 +224,15 @@ impl<'a> Checker<'_, 'a> {
             return None;
         };
         Some(step(base, Step::Field(owner, u32::try_from(at).unwrap_or(u32::MAX)), fields[at].ty, span))
+    }
+
+    /// A variable of a block that lies at an address, so in no instance; tests, which look inside of what they test, reach it too.
+    fn located_member(&mut self, pou: PouId, member: &Ident, span: Span) -> Option<Place> {
+        let info = self.an.info(pou)?;
+        let var = info.vars.iter().find(|var| var.symbol == member.symbol)?;
+        let located = var.located?;
+        self.note_image(located, self.an.types.extent(var.ty).0);
+        Some(Place { root: Root::Direct(located), path: Vec::new(), ty: var.ty, span })
     }
 
     fn element(&mut self, base: Place, indices: &'a [ast::Expr], span: Span) -> Option<Place> {

@@ -137,15 +137,16 @@ impl<'a> Analyzer<'a> {
 
     /// Gives each resource its globals; refuses that two resources use one.
     fn share_globals(&mut self, plans: &mut [ResourcePlan]) {
-        // Tests run one after the other, each with all globals anew.
-        let alone = plans.len() <= 1 || self.tests.is_some();
+        // Tests run one after the other, each with globals of its own.
+        let anew = self.tests.is_some();
+        let alone = plans.len() <= 1 || anew;
         let mut users: BTreeMap<GlobalId, usize> = BTreeMap::new();
         let mut clashes = Vec::new();
         for (at, plan) in plans.iter_mut().enumerate() {
             for (&global, &span) in &plan.usage.used_globals {
                 let Some(info) = self.globals.get(global.0 as usize) else { continue };
                 let folded = info.constant && info.located.is_none();
-                if info.resource.is_none() && !folded && users.insert(global, at).is_some_and(|other| other != at) {
+                if !anew && info.resource.is_none() && !folded && users.insert(global, at).is_some_and(|other| other != at) {
                     clashes.push((span, info.name.clone(), info.span));
                 }
             }

@@ -96,23 +96,12 @@ impl<'a> Analyzer<'a> {
             "watchdog" => duration().filter(|us| *us > 0).map(|us| plan.watchdog_us = us),
             "watchdog_sensitivity" => value.parse().ok().map(|count| plan.watchdog_sensitivity = count),
             "phase" => duration().map(|us| plan.phase_us = us),
-            "overrun" => match value.to_ascii_lowercase().as_str() {
-                "grid" => {
-                    let _: () = plan.overrun_policy = OverrunPolicy::Grid;
-                    Some(())
-                }
-                "at-once" => {
-                    let _: () = plan.overrun_policy = OverrunPolicy::AtOnce;
-                    Some(())
-                }
-                "realign" => {
-                    let _: () = plan.overrun_policy = OverrunPolicy::Realign;
-                    Some(())
-                }
-                _ => None,
-            },
-            // Attributes of other tools.
-            _ => Some(()),
+            "overrun" => overrun_policy(value).map(|policy| plan.overrun_policy = policy),
+            _ => {
+                let message = format!("a task has no attribute `{}`, so it is ignored", attribute.name);
+                self.report(&rules::UNKNOWN_ATTRIBUTE, attribute.span, message);
+                return;
+            }
         };
         if sound.is_none() {
             let message = format!("`{value}` is no value for the attribute `{}`", attribute.name);
@@ -202,6 +191,16 @@ fn is_stored(class: VarClass) -> bool {
 fn whole_microseconds(ns: i64) -> Option<u64> {
     let whole = ns % NS_PER_US == 0;
     u64::try_from(ns / NS_PER_US).ok().filter(|_| whole)
+}
+
+/// The overrun policy of this name.
+fn overrun_policy(name: &str) -> Option<OverrunPolicy> {
+    match name.to_ascii_lowercase().as_str() {
+        "grid" => Some(OverrunPolicy::Grid),
+        "at-once" => Some(OverrunPolicy::AtOnce),
+        "realign" => Some(OverrunPolicy::Realign),
+        _ => None,
+    }
 }
 
 /// `T#1s500ms` of an attribute, in nanoseconds.
