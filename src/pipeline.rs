@@ -86,6 +86,15 @@ pub enum EngineKind {
 impl EngineKind {
     /// Both, the definition first.
     pub const BOTH: [EngineKind; 2] = [EngineKind::Interp, EngineKind::Jit];
+
+    /// Its name on the command line and in reports.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            EngineKind::Jit => "jit",
+            EngineKind::Interp => "interp",
+        }
+    }
 }
 
 /// From files to verified programs.
@@ -113,7 +122,7 @@ pub fn compile(sources: &[SourceInput], options: &CompileOptions) -> Result<Load
     Ok(Loaded { programs, diagnostics: compilation.diagnostics, sources: compilation.sources })
 }
 
-fn program(name: String, container: Container) -> Result<Program, Refused> {
+pub(crate) fn program(name: String, container: Container) -> Result<Program, Refused> {
     let bytes = container::write(&container);
     let bytes = bytes.map_err(|error| Refused::TooLarge { resource: name.clone(), reason: error.to_string() })?;
     let verified = verify(container);

@@ -30,6 +30,8 @@ pub enum Command {
     Run(RunArgs),
     /// Measure the time of a scan
     Bench(BenchArgs),
+    /// Run unit tests written in Structured Text
+    Test(TestArgs),
     /// Run both engines in lock-step and report the first difference
     Diff(DiffArgs),
     /// Format Structured Text in place; comments and blank lines are kept
@@ -206,8 +208,8 @@ pub struct RunArgs {
     /// End after N rounds in which a task ran
     #[arg(long, value_name = "N")]
     pub scans: Option<u64>,
-    /// Run until stopped (the default without --scans)
-    #[arg(long, conflicts_with = "scans")]
+    /// Run until stopped, whatever --scans says (the default without --scans)
+    #[arg(long)]
     pub continuous: bool,
     /// What drives the scheduler
     #[arg(long, value_enum, default_value = "real")]
@@ -271,6 +273,52 @@ pub struct BenchArgs {
     #[command(flatten)]
     #[allow(missing_docs, reason = "clap would show it as help of the group")]
     pub common: Common,
+}
+
+/// How the results of tests are printed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum TestFormat {
+    /// For people.
+    Human,
+    /// One JSON object.
+    Json,
+    /// JUnit's XML.
+    Junit,
+    /// Test Anything Protocol, version 14.
+    Tap,
+}
+
+impl TestFormat {
+    /// How diagnostics and other failures are printed then.
+    pub fn failures(self) -> Format {
+        if self == TestFormat::Json { Format::Json } else { Format::Human }
+    }
+}
+
+/// `khz test`.
+#[derive(Debug, Args)]
+pub struct TestArgs {
+    #[command(flatten)]
+    #[allow(missing_docs, reason = "clap would show it as help of the group")]
+    pub sources: Sources,
+    /// On which engines each test must pass
+    #[arg(long, value_enum, default_value = "both")]
+    pub engine: EnginesArg,
+    /// How results are printed
+    #[arg(long, value_enum, default_value = "human")]
+    pub format: TestFormat,
+    /// Only tests whose name holds this text, in any case
+    #[arg(long, value_name = "TEXT")]
+    pub filter: Option<String>,
+    /// Name the tests and run none
+    #[arg(long)]
+    pub list: bool,
+    /// How long a test may compute, in microseconds of fuel: about 1000 instructions each; 0: without end
+    #[arg(long, value_name = "N", default_value_t = 1_000_000)]
+    pub watchdog_us: u64,
+    /// Largest memory image, in bytes
+    #[arg(long, value_name = "BYTES", default_value_t = khz_bytecode::limits::MAX_IMAGE_BYTES)]
+    pub max_image: u64,
 }
 
 /// `khz diff`.

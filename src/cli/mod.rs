@@ -14,6 +14,7 @@ mod report;
 mod run;
 mod session;
 mod stopwatch;
+mod test;
 mod trace;
 mod verify;
 
@@ -65,6 +66,7 @@ pub fn main() -> ExitCode {
         Command::Disasm(args) => (args.common.format, disasm::run(args)),
         Command::Run(args) => (args.common.format, run::run(args)),
         Command::Bench(args) => (args.common.format, bench::run(args)),
+        Command::Test(args) => (args.format.failures(), test::run(args)),
         Command::Diff(args) => (args.common.format, diff::run(args)),
         Command::Fmt(args) => (args.common.format, fmt::run(args)),
     };
