@@ -137,7 +137,9 @@ fn run(inputs: &[SourceInput], options: &CompileOptions, lowers: bool) -> Compil
         // What is wrong outside of the tests has been found already.
         let mut seen: BTreeSet<(Span, &str, String)> = BTreeSet::new();
         seen.extend(diagnostics.iter().map(|found| (found.span, found.code(), found.message.clone())));
-        diagnostics.extend(found.into_iter().filter(|found| !seen.contains(&(found.span, found.code(), found.message.clone()))));
+        diagnostics.extend(
+            found.into_iter().filter(|found| !seen.contains(&(found.span, found.code(), found.message.clone()))),
+        );
     }
     Compilation { resources, diagnostics: tidy(diagnostics), sources }
 }
@@ -149,7 +151,8 @@ fn run_tests(inputs: &[SourceInput], options: &CompileOptions) -> TestCompilatio
     let (project, findings, found) = analysis::analyze_tests(&ast, options.dialect, standard, &units);
     // Each test's resource checks what it reaches: a mistake there is found once for each.
     let mut seen: BTreeSet<(Span, &str, String)> = BTreeSet::new();
-    diagnostics.extend(found.into_iter().filter(|found| seen.insert((found.span, found.code(), found.message.clone()))));
+    diagnostics
+        .extend(found.into_iter().filter(|found| seen.insert((found.span, found.code(), found.message.clone()))));
     let mut tests = Vec::new();
     if !has_errors(&diagnostics) {
         let hashes = lower::Hashes::of(inputs, &sources);

@@ -1,9 +1,9 @@
 //! `khz test`: unit tests written in ST.
 
+use khz_frontend::diagnostics::Severity;
 use kilohertz::files::{self, Input};
 use kilohertz::pipeline::{EngineKind, Refused};
 use kilohertz::testing::{self, Suite, Test, TestOptions, TestResult, report};
-use khz_frontend::diagnostics::Severity;
 
 use super::args::{EnginesArg, Format, TestArgs, TestFormat};
 use super::output::{Failure, compile_options, people, print_diagnostics, result};
@@ -76,9 +76,10 @@ fn refuse(args: &TestArgs, refused: Refused) -> Outcome {
     let first = match &refused {
         Refused::Diagnostics { diagnostics, sources } => {
             let first = diagnostics.iter().find(|found| found.severity == Severity::Error);
-            first.map_or_else(|| refused.to_string(), |found| {
-                format!("{}: {} {}", sources.place(found.span), found.code(), found.message)
-            })
+            first.map_or_else(
+                || refused.to_string(),
+                |found| format!("{}: {} {}", sources.place(found.span), found.code(), found.message),
+            )
         }
         other => other.to_string(),
     };

@@ -10,18 +10,18 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use khz_bytecode::container::SystemVariableKind;
 use khz_bytecode::limits::SLOT_BYTES;
-use khz_frontend::testing::{Assertion, OperandValue};
-use khz_frontend::{CompileOptions, SourceInput};
 use khz_frontend::diagnostics::Diagnostic;
 use khz_frontend::source::SourceMap;
+use khz_frontend::testing::{Assertion, OperandValue};
+use khz_frontend::{CompileOptions, SourceInput};
 use khz_machine::engine::Entry;
 use khz_machine::image::Image;
 use khz_machine::report::{SourcePosition, TrapReport};
 use khz_machine::variables::{VariableTable, VariableValue};
 use khz_scheduler::time::TimeNs;
 use khz_scheduler::{
-    Clock, ClockKind, FaultPlace, Faulted, HoldsContainer, Hooks, LoadError, LoadOptions, NoInputs, NoIo, NoObserver, Resource, Running,
-    StopHandle, Wake,
+    Clock, ClockKind, FaultPlace, Faulted, HoldsContainer, Hooks, LoadError, LoadOptions, NoInputs, NoIo, NoObserver,
+    Resource, Running, StopHandle, Wake,
 };
 
 use crate::pipeline::{self, EngineKind, Program, Refused};

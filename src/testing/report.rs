@@ -131,7 +131,8 @@ pub fn list_json(tests: &[&Test]) -> Value {
 /// All results as JUnit's XML: a suite for each file, an assertion is a failure, everything else an error.
 #[must_use]
 pub fn junit(results: &[TestResult]) -> String {
-    let is_error = |result: &&TestResult| result.failures.iter().any(|(_, found)| !matches!(found, Failure::Assertion(_)));
+    let is_error =
+        |result: &&TestResult| result.failures.iter().any(|(_, found)| !matches!(found, Failure::Assertion(_)));
     let figures = |some: &[&TestResult]| {
         let errors = some.iter().filter(|result| is_error(result)).count();
         let failures = some.iter().filter(|result| !result.passed()).count() - errors;
@@ -145,7 +146,11 @@ pub fn junit(results: &[TestResult]) -> String {
         let _ = writeln!(xml, "  <testsuite name=\"{file}\" {}>", figures(suite));
         for result in suite {
             let name = escape(&result.name);
-            let _ = write!(xml, "    <testcase name=\"{name}\" classname=\"{file}\" file=\"{file}\" line=\"{}\"", result.place.line);
+            let _ = write!(
+                xml,
+                "    <testcase name=\"{name}\" classname=\"{file}\" file=\"{file}\" line=\"{}\"",
+                result.place.line
+            );
             if result.passed() {
                 xml.push_str("/>\n");
                 continue;

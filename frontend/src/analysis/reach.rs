@@ -146,7 +146,11 @@ impl<'a> Analyzer<'a> {
             for (&global, &span) in &plan.usage.used_globals {
                 let Some(info) = self.globals.get(global.0 as usize) else { continue };
                 let folded = info.constant && info.located.is_none();
-                if !anew && info.resource.is_none() && !folded && users.insert(global, at).is_some_and(|other| other != at) {
+                if !anew
+                    && info.resource.is_none()
+                    && !folded
+                    && users.insert(global, at).is_some_and(|other| other != at)
+                {
                     clashes.push((span, info.name.clone(), info.span));
                 }
             }
