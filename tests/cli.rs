@@ -251,3 +251,24 @@ fn what_the_host_refuses_is_status_4() {
     assert_eq!(output.status.code(), Some(4), "{}", stderr(&output));
     assert!(stderr(&output).contains("processor 1000000"), "{}", stderr(&output));
 }
+
+#[test]
+fn diff_ends_an_endless_loop_by_itself() {
+    let scratch = Scratch::new("diff-endless");
+    let source = scratch
+        .write("endless.st", "PROGRAM main VAR n : DINT; END_VAR WHILE TRUE DO n := n + 1; END_WHILE; END_PROGRAM");
+    let output = khz().arg("diff").arg(&source).output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    assert!(stderr(&output).contains("both trapped: watchdog"), "{}", stderr(&output));
+}
+
+#[test]
+fn a_misspelt_attribute_is_noticed() {
+    let scratch = Scratch::new("attribute");
+    let text = "PROGRAM main END_PROGRAM CONFIGURATION c RESOURCE r ON PLC {attribute 'watchdgo' := 'T#5ms'} \
+                TASK t(INTERVAL := T#1ms, PRIORITY := 0); PROGRAM p WITH t : main; END_RESOURCE END_CONFIGURATION";
+    let source = scratch.write("attribute.st", text);
+    let output = khz().arg("check").arg(&source).output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    assert!(stderr(&output).contains("warning[S0042]"), "{}", stderr(&output));
+}

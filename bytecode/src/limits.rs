@@ -33,7 +33,7 @@ pub const MAX_CALL_DEPTH: u16 = 1024;
 /// Most operands of one `switch`.
 pub const MAX_SWITCH_TARGETS: u32 = 65_536;
 /// Largest declared length of a STRING, in characters.
-pub const MAX_STRING_LENGTH: u32 = 65_534;
+pub const MAX_STRING_LENGTH: u32 = 65_535;
 /// Places that a trap report keeps of the call chain, innermost first.
 pub const MAX_TRAP_CHAIN: usize = 16;
 /// Shortest INTERVAL of a task, in microseconds.
@@ -43,4 +43,4 @@ pub const STARTUP_WATCHDOG_US: u64 = 1_000_000;
 
 const _: () = assert!(NULL_GUARD_BYTES >= SLOT_BYTES);
 const _: () = assert!(REGION_ALIGN_BYTES.is_multiple_of(FRAME_ALIGN_BYTES));
-const _: () = assert!(MAX_STRING_LENGTH < 65_536);
+const _: () = assert!(MAX_STRING_LENGTH <= u16::MAX as u32);

@@ -1,7 +1,8 @@
-//! `khz diff`: both engines in lock-step on the virtual clock; the first difference.
+//! `khz diff`: both engines in lock-step on the virtual clock, with and without fuel; the first difference.
 
 use khz_machine::image::Image;
 use khz_machine::report::TrapReport;
+use khz_machine::trap::TrapCode;
 use khz_scheduler::{FaultPlace, Faulted, Hooks, NoInputs, NoIo, NoObserver, Resource, Round, Running};
 use khz_scheduler::{InputSource, Wake};
 use kilohertz::pipeline::EngineKind;
@@ -36,7 +37,7 @@ impl State {
     }
 }
 
-/// What both sides say of a round, to be compared.
+/// What a side says of a round, to be compared.
 #[derive(Debug, PartialEq)]
 struct Step {
     round: Option<Round>,
@@ -89,30 +90,46 @@ impl Side {
     }
 }
 
+/// Watchdog of the runs with fuel where nothing sets one, in microseconds: an endless loop ends, in both engines at the same place.
+const DEFAULT_WATCHDOG_US: u64 = 100_000;
+
+/// Both engines, each with code that charges fuel and with code that does not (architecture §7): the first is the one that the others are compared with.
+const SIDES: [(EngineKind, bool); 4] =
+    [(EngineKind::Interp, true), (EngineKind::Jit, true), (EngineKind::Interp, false), (EngineKind::Jit, false)];
+
 /// Runs it.
 pub fn run(args: &DiffArgs) -> Outcome {
     let program = choose(load(&args.sources)?, args.resource.resource.as_deref())?;
-    let session = Session::new(program, &args.resource);
-    let fuel = session.needs_fuel();
-    let mut sides = [Side::open(&session, EngineKind::Interp, fuel)?, Side::open(&session, EngineKind::Jit, fuel)?];
+    let mut given = args.resource.clone();
+    if given.watchdog_us == 0 {
+        given.watchdog_us = DEFAULT_WATCHDOG_US;
+    }
+    let session = Session::new(program, &given);
+    let mut sides = Vec::with_capacity(SIDES.len());
+    for (kind, fuel) in SIDES {
+        sides.push(Side::open(&session, kind, fuel)?);
+    }
     let mut rounds = 0;
-    loop {
-        let steps = [sides[0].step(), sides[1].step()];
-        if let Some(difference) = difference(&session, &sides, &steps) {
-            return Ok(report(args, rounds, &difference));
+    let trap = loop {
+        let (with_fuel, without) = sides.split_at_mut(2);
+        let mut steps: Vec<Step> = with_fuel.iter_mut().map(Side::step).collect();
+        let trap = steps[0].trap.map(|trap| trap.code);
+        // Code without fuel would not end where the watchdog ended the others.
+        if trap != Some(TrapCode::Watchdog) {
+            steps.extend(without.iter_mut().map(Side::step));
+        }
+        for (at, step) in steps.iter().enumerate().skip(1) {
+            if let Some(difference) = difference(&session, [(0, &sides[0], &steps[0]), (at, &sides[at], step)]) {
+                return Ok(report(args, rounds, &difference));
+            }
         }
         rounds += 1;
-        let ended = steps[0].trap.is_some() || steps[0].wake == Some(Wake::Never);
-        if ended || rounds >= args.scans {
-            break;
+        if trap.is_some() || steps[0].wake == Some(Wake::Never) || rounds >= args.scans {
+            break trap;
         }
-    }
-    let trap = match &sides[0].state {
-        State::Faulted(faulted) => Some(faulted.report().trap.code.name()),
-        _ => None,
     };
     if args.common.format == Format::Json {
-        result(&json!({ "equal": true, "rounds": rounds, "trap": trap }).to_string());
+        result(&json!({ "equal": true, "rounds": rounds, "trap": trap.map(TrapCode::name) }).to_string());
     } else {
         let ending = trap.map_or(String::new(), |trap| format!("; both trapped: {trap}"));
         people(&format!("equal after {rounds} rounds{ending}"));
@@ -120,28 +137,34 @@ pub fn run(args: &DiffArgs) -> Outcome {
     Ok(Status::Done)
 }
 
+/// How a side is called in messages.
+fn side_name(at: usize) -> String {
+    let (kind, fuel) = SIDES[at];
+    let engine = if kind == EngineKind::Interp { "interp" } else { "jit" };
+    format!("{engine} {} fuel", if fuel { "with" } else { "without" })
+}
+
 /// The first difference in words, if there is one.
-fn difference(session: &Session<'_>, sides: &[Side; 2], steps: &[Step; 2]) -> Option<String> {
-    if steps[0] != steps[1] {
+fn difference(session: &Session<'_>, pair: [(usize, &Side, &Step); 2]) -> Option<String> {
+    let [(first, a, step_a), (second, b, step_b)] = pair;
+    let (first, second) = (side_name(first), side_name(second));
+    if step_a != step_b {
         let describe = |step: &Step| match step.trap {
             Some(trap) => TrapReport::new(&trap, entry(step.place), session.program.container()).to_string(),
             None => format!("no trap, {} tasks ran", step.round.map_or(0, |round| round.tasks)),
         };
-        return Some(format!("interp: {}\njit:    {}", describe(&steps[0]), describe(&steps[1])));
+        return Some(format!("{first}: {}\n{second}: {}", describe(step_a), describe(step_b)));
     }
-    let (a, b) = (sides[0].state.image()?, sides[1].state.image()?);
+    let (a, b) = (a.state.image()?, b.state.image()?);
     let at = a.first_difference(b)?;
     let differing = session.names.variables().flat_map(|v| session.names.leaves(&v, 10_000));
     let mut differing = differing.filter(|v| session.names.text(a, v) != session.names.text(b, v));
     Some(differing.next().map_or_else(
         || {
-            format!(
-                "memory image differs at offset {at}: interp {:#04x}, jit {:#04x}",
-                a.bytes()[at as usize],
-                b.bytes()[at as usize]
-            )
+            let (x, y) = (a.bytes()[at as usize], b.bytes()[at as usize]);
+            format!("memory image differs at offset {at}: {first} {x:#04x}, {second} {y:#04x}")
         },
-        |v| format!("{}: interp {}, jit {}", v.name, session.names.text(a, &v), session.names.text(b, &v)),
+        |v| format!("{}: {first} {}, {second} {}", v.name, session.names.text(a, &v), session.names.text(b, &v)),
     ))
 }
 

@@ -66,7 +66,7 @@ fn run_on_scan_thread(args: &RunArgs, session: &Session<'_>, stop: StopHandle, h
     };
     let mut io = NoIo;
     let mut hooks = Hooks { io: &mut io, inputs, observer: &mut onlooker };
-    let outcome = run_rounds(running, &mut hooks, RunOptions { scans: args.scans });
+    let outcome = run_rounds(running, &mut hooks, RunOptions { scans: args.scans.filter(|_| !args.continuous) });
     onlooker.finish()?;
     end(args, session, outcome)
 }

@@ -103,8 +103,6 @@ rules! {
         "A virtual call is typed by the method's name; whichever function it finds must fit."),
     (11, UnionWidth, Types, "The alternatives of nested unions do not multiply beyond the limit.",
         "An access into a union is proven by trying its fields; without a limit a small file could ask for endless tries."),
-    (12, StringCapacity, Types, "The length of a string type is at most the limit.",
-        "String instructions count in 16 bits, terminator included."),
     (13, MethodSignature, Types, "A method name's signature uses only types that exist, and has no more results than the limit allows.",
         "Virtual calls are typed by it."),
     (20, DataLayout, Memory, "Variables of the data region ascend, do not overlap, are aligned, and lie inside the region behind its first 16 bytes.",

@@ -5,7 +5,7 @@ use super::facts::Extent;
 use super::rules::Rule;
 use crate::container::{ArrayDescriptor, BlockInstance, DataVariable, Record, Type, TypeSection};
 use crate::ids::TypeId;
-use crate::limits::{MAX_DIMENSIONS, MAX_RESULTS, MAX_STRING_LENGTH, MAX_TYPE_DEPTH, MAX_UNION_ALTERNATIVES};
+use crate::limits::{MAX_DIMENSIONS, MAX_RESULTS, MAX_TYPE_DEPTH, MAX_UNION_ALTERNATIVES};
 use crate::value::{LocalType, Storage};
 
 /// What is known of one type beside its extent.
@@ -99,8 +99,8 @@ impl<'c> TypeTable<'c> {
                 let extent = Extent { size: storage.bytes(), align: storage.bytes() };
                 Ok((extent, Traits { has_float: storage.is_float(), ..plain }))
             }
-            Type::String { capacity } => Ok((self.string_extent(index, *capacity, 1)?, plain)),
-            Type::WideString { capacity } => Ok((self.string_extent(index, *capacity, 2)?, plain)),
+            Type::String { capacity } => Ok((Self::string_extent(*capacity, 1), plain)),
+            Type::WideString { capacity } => Ok((Self::string_extent(*capacity, 2), plain)),
             Type::Array(array) => {
                 let Some(descriptor) = self.section.arrays.get(array.index()) else {
                     let message = format!("array {array} does not exist");
@@ -127,12 +127,8 @@ impl<'c> TypeTable<'c> {
         }
     }
 
-    fn string_extent(&self, index: usize, capacity: u16, unit: u32) -> Check<Extent> {
-        if u32::from(capacity) > MAX_STRING_LENGTH {
-            let message = format!("its length is {capacity}; at most {MAX_STRING_LENGTH} is allowed");
-            return Err(VerifyError::entry(Rule::StringCapacity, "type", index, message));
-        }
-        Ok(Extent { size: (u32::from(capacity) + 1) * unit, align: unit })
+    fn string_extent(capacity: u16, unit: u32) -> Extent {
+        Extent { size: (u32::from(capacity) + 1) * unit, align: unit }
     }
 
     fn earlier(&self, index: usize, ty: TypeId) -> Check {

@@ -196,6 +196,11 @@ rules! {
         wrong "PROGRAM p\nEND_PROGRAM\nCONFIGURATION c\n  RESOURCE r ON cpu\n    TASK t(PRIORITY := 0);\n    PROGRAM i WITH t : p;\n  END_RESOURCE\nEND_CONFIGURATION\n"
         right "PROGRAM p\nEND_PROGRAM\nCONFIGURATION c\n  RESOURCE r ON cpu\n    TASK t(INTERVAL := T#1ms, PRIORITY := 0);\n    PROGRAM i WITH t : p;\n  END_RESOURCE\nEND_CONFIGURATION\n"
     }
+    UNKNOWN_ATTRIBUTE = "S0042" Warning "an attribute that no task has" {
+        "Attributes of a task are 'watchdog', 'watchdog_sensitivity', 'phase' and 'overrun'. Another one, perhaps of another tool or misspelt, changes nothing."
+        wrong "PROGRAM p\nEND_PROGRAM\nCONFIGURATION c\n  RESOURCE r ON cpu\n    {attribute 'watchdgo' := 'T#5ms'}\n    TASK t(INTERVAL := T#1ms, PRIORITY := 0);\n    PROGRAM i WITH t : p;\n  END_RESOURCE\nEND_CONFIGURATION\n"
+        right "PROGRAM p\nEND_PROGRAM\nCONFIGURATION c\n  RESOURCE r ON cpu\n    {attribute 'watchdog' := 'T#5ms'}\n    TASK t(INTERVAL := T#1ms, PRIORITY := 0);\n    PROGRAM i WITH t : p;\n  END_RESOURCE\nEND_CONFIGURATION\n"
+    }
     LIMIT = "S0050" Error "a limit of the container" {
         "The compiled form has room for 65535 of each kind of thing, and a memory image has a largest size. Split the project into resources."
         wrong ""

@@ -24,12 +24,14 @@ type Index = std::collections::HashMap<Box<str>, Symbol>;
 pub struct Interner {
     texts: Vec<Box<str>>,
     folded: Vec<Symbol>,
+    /// Of a folded symbol, its spelling in the sources that came first.
+    written: Vec<Symbol>,
     index: Index,
 }
 
 impl Default for Interner {
     fn default() -> Self {
-        let mut new = Self { texts: Vec::new(), folded: Vec::new(), index: Index::new() };
+        let mut new = Self { texts: Vec::new(), folded: Vec::new(), written: Vec::new(), index: Index::new() };
         new.add("", None);
         new
     }
@@ -73,6 +75,11 @@ impl Interner {
         self.texts.get(symbol.index()).map_or("", |text| text)
     }
 
+    /// The text of a name as the sources first write it, for messages.
+    pub fn text_as_written(&self, symbol: Symbol) -> &str {
+        self.text(self.written.get(symbol.index()).copied().unwrap_or(symbol))
+    }
+
     /// How many symbols there are.
     pub fn len(&self) -> usize {
         self.texts.len()
@@ -88,6 +95,12 @@ impl Interner {
         let symbol = Symbol(u32::try_from(self.texts.len()).unwrap_or(u32::MAX));
         self.texts.push(text.into());
         self.folded.push(folded.unwrap_or(symbol));
+        self.written.push(symbol);
+        if let Some(written) = folded.and_then(|folded| self.written.get_mut(folded.index()))
+            && Some(*written) == folded
+        {
+            *written = symbol;
+        }
         self.index.insert(text.into(), symbol);
         symbol
     }
@@ -111,6 +124,7 @@ mod tests {
         assert_eq!(names.intern_folded("mOTOR_1"), second);
         assert_eq!(names.lookup_folded("motor_1"), Some(second));
         assert_eq!(names.lookup_folded("other"), None);
+        assert_eq!(names.text_as_written(second), "Motor_1");
     }
 
     #[test]

@@ -182,7 +182,7 @@ fn push_escape(units: &mut Vec<u16>, rest: &mut std::str::Chars<'_>, hex_digits:
         Some('\'') => &[0x27],
         Some('"') => &[0x22],
         Some('L') => &[0x0A],
-        Some('N') => &[0x0D, 0x0A],
+        Some('N') => &[0x0A],
         Some('P') => &[0x0C],
         Some('R') => &[0x0D],
         Some('T') => &[0x09],
