@@ -59,7 +59,7 @@ pub(crate) fn compile(scope: &Scope<'_>, plan: &Plan, options: JitOptions) -> Re
     let mut builder_context = FunctionBuilderContext::new();
     for key in plan.functions.keys() {
         let mut function = build(scope, key.0, key.1);
-        passes::run(&mut function, scope.verified, options.passes);
+        passes::run(&mut function, scope.verified, options.passes, options.fuel);
         assembly.start_function();
         lower(scope, &function, key.1, settings, &mut assembly, &mut compilation.func, &mut builder_context);
         assembly.define(*key, &mut compilation)?;

@@ -57,7 +57,7 @@ fn form_of(
         return None;
     }
     let mut form = build(scope, key.0, key.1);
-    passes::run(&mut form, scope.verified, options.passes);
+    passes::run(&mut form, scope.verified, options.passes, options.fuel);
     Some((key, form))
 }
 

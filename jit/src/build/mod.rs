@@ -154,11 +154,12 @@ impl<'a> Builder<'a> {
         }
         let first = parameters.len() - usize::from(self.code.parameters).min(self.code.locals.len());
         let fuel = self.facts.entry_fuel;
-        self.effect(Op::Checkpoint { fuel, deadline: true });
+        // Zeroed first: a run that ends here leaves a frame that a later run may look at.
         if self.facts.frame_bytes > 0 {
             let frame = self.at(Base::Value(self.out.frame), 0);
             self.effect(Op::Zero(frame, self.facts.frame_bytes));
         }
+        self.effect(Op::Checkpoint { fuel, deadline: true });
         for (position, ty) in self.code.locals.iter().enumerate() {
             let value = match parameters.get(first + position) {
                 Some(value) => self.wrap_local(*ty, *value),
@@ -339,8 +340,8 @@ impl<'a> Builder<'a> {
             Type::I64 => self.constant(Const::I64(0)),
             Type::F32 => self.constant(Const::F32(0)),
             Type::F64 => self.constant(Const::F64(0)),
-            // Never read: a reference is assigned on every path before its use.
-            Type::Ref => {
+            // Never read: a reference is assigned on every path before its use. Vectors come up later, and are no local's type.
+            Type::Ref | Type::F32x4 | Type::F64x2 => {
                 self.define(Type::Ref, Op::Reference(Address { base: Base::Image, displacement: 0, index: None }))
             }
         }

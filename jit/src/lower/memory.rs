@@ -5,9 +5,9 @@ use cranelift_codegen::ir::{self, InstBuilder, MemFlagsData, types};
 use khz_bytecode::limits::SLOT_BYTES;
 use khz_bytecode::value::{SlotPlace, Storage};
 
-use super::Lowerer;
+use super::{Lowerer, clif_type};
 use crate::build::ProgramMemory;
-use crate::mir::{Access, Address, Base, Instruction, Op, Region, Slot};
+use crate::mir::{Access, Address, Base, Instruction, Op, Region, Results, Slot, Type};
 use crate::runtime::{MOVE_BYTES, ZERO_BYTES};
 
 /// Largest block move or zeroing, in bytes, that is written out as loads and stores.
@@ -29,7 +29,13 @@ impl Lowerer<'_, '_> {
             }
             Op::Load(address, access) => {
                 let (base, offset) = self.address(address);
-                let value = self.load(base, offset, *access);
+                let value = match results {
+                    Results::One(result) if matches!(self.function.ty(*result), Type::F32x4 | Type::F64x2) => {
+                        let (ty, flags) = (clif_type(self.function.ty(*result)), self.flags(access.region));
+                        self.builder.ins().load(ty, flags, base, offset)
+                    }
+                    _ => self.load(base, offset, *access),
+                };
                 self.define(results, value);
             }
             Op::Store(address, access, value) => {

@@ -57,6 +57,8 @@ pub(crate) fn clif_type(ty: Type) -> ir::Type {
         Type::I64 | Type::Ref => types::I64,
         Type::F32 => types::F32,
         Type::F64 => types::F64,
+        Type::F32x4 => types::F32X4,
+        Type::F64x2 => types::F64X2,
     }
 }
 
@@ -262,6 +264,7 @@ impl Lowerer<'_, '_> {
                 let clif = self.builder.ins().select(condition, then, otherwise);
                 self.define(results, clif);
             }
+            Op::Splat(_) | Op::Lane(..) | Op::Ramp { .. } => self.vector(instruction),
             Op::Get(var) => {
                 let clif = self.builder.use_var(self.variables[var.index()]);
                 self.define(results, clif);

@@ -5,8 +5,8 @@ use cranelift_codegen::ir::{self, InstBuilder, MemFlagsData, types};
 use khz_bytecode::instruction::NumericOp;
 use khz_machine::semantics::{NAN_F32_BITS, NAN_F64_BITS};
 
-use super::{Lowerer, clif_value_type};
-use crate::mir::{Const, Operands};
+use super::{Lowerer, clif_type, clif_value_type};
+use crate::mir::{Const, Instruction, Op, Operands};
 use crate::runtime::numeric_routine;
 
 /// How a conversion from floating point rounds.
@@ -29,6 +29,38 @@ impl Lowerer<'_, '_> {
         let number = number.or_else(|| self.float_comparison(op, a, b));
         let number = number.or_else(|| self.conversion(op, a));
         number.or_else(|| self.float_to_integer(op, a)).unwrap_or_else(|| self.by_routine(op, a, b))
+    }
+
+    /// Lowers what makes a vector, or takes a lane of one.
+    pub(super) fn vector(&mut self, instruction: &Instruction) {
+        let ty =
+            instruction.results.as_slice().first().map_or(types::F32X4, |result| clif_type(self.function.ty(*result)));
+        let result = match instruction.op {
+            Op::Splat(value) => {
+                let value = self.value(value);
+                self.builder.ins().splat(ty, value)
+            }
+            Op::Lane(value, lane) => {
+                let value = self.value(value);
+                self.builder.ins().extractlane(value, lane)
+            }
+            Op::Ramp { first, growth } => {
+                let first = self.value(first);
+                let all = self.builder.ins().splat(types::I32X4, first);
+                let distances: Vec<u8> = (0..4).flat_map(|lane| growth.wrapping_mul(lane).to_le_bytes()).collect();
+                let distances = self.builder.func.dfg.constants.insert(distances.into());
+                let distances = self.builder.ins().vconst(types::I32X4, distances);
+                let ramp = self.builder.ins().iadd(all, distances);
+                if ty == types::F32X4 {
+                    self.builder.ins().fcvt_from_sint(ty, ramp)
+                } else {
+                    let wide = self.builder.ins().swiden_low(ramp);
+                    self.builder.ins().fcvt_from_sint(ty, wide)
+                }
+            }
+            _ => return,
+        };
+        self.define(&instruction.results, result);
     }
 
     fn by_routine(&mut self, op: NumericOp, a: ir::Value, b: ir::Value) -> ir::Value {

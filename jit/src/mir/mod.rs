@@ -64,6 +64,10 @@ pub enum Type {
     F64,
     /// A verified reference: the address in this process of something inside the image. Never stored in the image.
     Ref,
+    /// Four REALs.
+    F32x4,
+    /// Two LREALs.
+    F64x2,
 }
 
 impl From<ValueType> for Type {
@@ -194,7 +198,7 @@ pub type Operands = [Value; 2];
 pub enum Op {
     /// A constant.
     Const(Const),
-    /// A pure operation. Divisions are guarded by a [`Op::CheckDivisor`] before them and never trap.
+    /// A pure operation; floats may be vectors, lane by lane. Divisions are guarded by a [`Op::CheckDivisor`] before them and never trap.
     Numeric(NumericOp, Operands),
     /// a if c is not zero, else b.
     Select {
@@ -204,6 +208,17 @@ pub enum Op {
         then: Value,
         /// When it is zero.
         otherwise: Value,
+    },
+    /// A float in every lane of a vector.
+    Splat(Value),
+    /// One lane of a vector.
+    Lane(Value, u8),
+    /// A vector of floats: an i32, and in each further lane `growth` more, converted.
+    Ramp {
+        /// i32.
+        first: Value,
+        /// From lane to lane.
+        growth: i32,
     },
     /// Reads a variable.
     Get(Var),
@@ -563,7 +578,10 @@ impl Op {
             Op::Const(_) | Op::Get(_) | Op::LoadSlot(..) | Op::Checkpoint { .. } => {}
             Op::Numeric(_, operands) => operands.iter_mut().for_each(f),
             Op::Select { condition, then, otherwise } => [condition, then, otherwise].into_iter().for_each(f),
-            Op::Set(_, value)
+            Op::Splat(value)
+            | Op::Lane(value, _)
+            | Op::Ramp { first: value, .. }
+            | Op::Set(_, value)
             | Op::StoreSlot(_, _, value)
             | Op::RefToInt(value)
             | Op::RefCheck { offset: value, .. }

@@ -15,6 +15,8 @@ impl Display for Type {
             Type::F32 => "f32",
             Type::F64 => "f64",
             Type::Ref => "ref",
+            Type::F32x4 => "f32x4",
+            Type::F64x2 => "f64x2",
         })
     }
 }
@@ -97,6 +99,9 @@ impl Display for Op {
             Op::Select { condition, then, otherwise } => write!(f, "select {condition} ? {then} : {otherwise}"),
             Op::Get(var) => write!(f, "get {var}"),
             Op::Set(var, value) => write!(f, "set {var}, {value}"),
+            Op::Splat(value) => write!(f, "splat {value}"),
+            Op::Lane(value, lane) => write!(f, "lane {value}.{lane}"),
+            Op::Ramp { first, growth } => write!(f, "ramp {first} by {growth}"),
             Op::LoadSlot(slot, access) => write!(f, "slot.load {slot} {access}"),
             Op::StoreSlot(slot, access, value) => write!(f, "slot.store {slot} {access}, {value}"),
             Op::Load(address, access) => write!(f, "load {access} {address}"),

@@ -10,6 +10,7 @@ pub mod for_loops;
 pub mod if_convert;
 pub mod promote;
 pub mod ranges;
+pub mod vectorise;
 
 use khz_bytecode::verify::Verified;
 
@@ -53,6 +54,8 @@ passes! {
     checks;
     /// [`deadlines`]: no look at the deadline in loops that are short by proof.
     deadlines;
+    /// [`vectorise`]: loops over independent elements in vectors. Not in code that charges fuel.
+    vectorise;
     /// [`if_convert`]: short integer IFs as selects.
     if_convert;
     /// [`bools`]: NOT of a BOOL without a test.
@@ -65,8 +68,8 @@ impl Default for Passes {
     }
 }
 
-/// Runs the passes on a function.
-pub fn run(function: &mut Function, verified: &Verified, passes: Passes) {
+/// Runs the passes on a function. `fuel`: whether its code charges fuel.
+pub fn run(function: &mut Function, verified: &Verified, passes: Passes, fuel: bool) {
     if passes.promote {
         promote::run(function, promote::CallEffects::new(verified));
     }
@@ -78,6 +81,9 @@ pub fn run(function: &mut Function, verified: &Verified, passes: Passes) {
     }
     if passes.deadlines {
         deadlines::run(function);
+    }
+    if passes.vectorise && !fuel {
+        vectorise::run(function);
     }
     if passes.for_loops {
         for_loops::run(function);
