@@ -131,11 +131,15 @@ impl Lowerer<'_, '_> {
 
     fn leave_if(&mut self, condition: ir::Value, code: ir::Value, values: [ir::Value; 3]) {
         let exit = self.trap_exit();
+        // What is recorded is computed behind the function, in a cold block of each guard's own; the way past it only compares.
+        let (cold, next) = (self.builder.create_block(), self.builder.create_block());
+        self.builder.set_cold_block(cold);
+        self.builder.ins().brif(condition, cold, &[], next, &[]);
+        self.builder.switch_to_block(cold);
         let place = self.linker.place(&self.function.places, self.place);
         let place = self.builder.ins().iconst(types::I32, i64::from(place));
         let arguments = [code, place, values[0], values[1], values[2]].map(BlockArg::Value);
-        let next = self.builder.create_block();
-        self.builder.ins().brif(condition, exit, &arguments, next, &[]);
+        self.builder.ins().jump(exit, &arguments);
         self.builder.switch_to_block(next);
     }
 
@@ -152,10 +156,13 @@ impl Lowerer<'_, '_> {
                 exit
             }
         };
+        let (cold, next) = (self.builder.create_block(), self.builder.create_block());
+        self.builder.set_cold_block(cold);
+        self.builder.ins().brif(status, cold, &[], next, &[]);
+        self.builder.switch_to_block(cold);
         let place = self.linker.place(&self.function.places, self.place);
         let place = self.builder.ins().iconst(types::I32, i64::from(place));
-        let next = self.builder.create_block();
-        self.builder.ins().brif(status, exit, &[BlockArg::Value(place)], next, &[]);
+        self.builder.ins().jump(exit, &[BlockArg::Value(place)]);
         self.builder.switch_to_block(next);
     }
 

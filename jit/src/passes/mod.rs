@@ -10,6 +10,8 @@ pub mod for_loops;
 pub mod if_convert;
 pub mod promote;
 pub mod ranges;
+pub mod repeats;
+pub mod threads;
 pub mod vectorise;
 
 use khz_bytecode::verify::Verified;
@@ -58,6 +60,10 @@ passes! {
     vectorise;
     /// [`if_convert`]: short integer IFs as selects.
     if_convert;
+    /// [`threads`]: no question where the answer was just set.
+    threads;
+    /// [`repeats`]: guards that were passed before.
+    repeats;
     /// [`bools`]: NOT of a BOOL without a test.
     bools;
 }
@@ -93,6 +99,12 @@ pub fn run(function: &mut Function, verified: &Verified, passes: Passes, fuel: b
     }
     if passes.if_convert {
         if_convert::run(function);
+    }
+    if passes.threads {
+        threads::run(function);
+    }
+    if passes.repeats {
+        repeats::run(function);
     }
     if passes.bools {
         bools::run(function);
