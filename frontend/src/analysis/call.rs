@@ -20,6 +20,23 @@ struct Bound<'a> {
     outputs: Vec<(VarId, &'a ast::Expr, bool)>,
     en: Option<&'a ast::Expr>,
     eno: Option<(&'a ast::Expr, bool)>,
+    /// ENO is an output that the unit declares itself, so its body says what it is.
+    declares_eno: bool,
+}
+
+/// Whether a parameter is an EN that the unit declares itself.
+fn is_en(text: &str, var: &VarInfo) -> bool {
+    text == "EN" && var.class == VarClass::Input && var.ty == BOOL
+}
+
+/// Whether a parameter is an ENO that the unit declares itself.
+pub(super) fn is_eno(text: &str, var: &VarInfo) -> bool {
+    text == "ENO" && var.class == VarClass::Output && var.ty == BOOL
+}
+
+/// TRUE.
+fn truth(span: Span) -> Expr {
+    Expr { kind: ExprKind::Const(Const::Int(1)), ty: BOOL, span }
 }
 
 /// What a call means.
@@ -195,6 +212,13 @@ impl<'a> Checker<'_, 'a> {
             let found = parameters.iter().find(|(_, var)| var.symbol == name.symbol);
             let text = self.an.text(name.symbol);
             match (found, output, value) {
+                // A unit may declare EN itself (6.6.1.7): it is the condition of the call all the same.
+                (Some((_, var)), None, Some(value)) if is_en(text, var) => bound.en = Some(value),
+                (Some((id, var)), Some(negated), Some(value)) if is_eno(text, var) => {
+                    bound.outputs.push((*id, value, negated));
+                    bound.eno = Some((value, negated));
+                    bound.declares_eno = true;
+                }
                 (None, None, Some(value)) if text == "EN" => bound.en = Some(value),
                 (None, Some(negated), Some(value)) if text == "ENO" => bound.eno = Some((value, negated)),
                 (None, _, _) if text == "EN" || text == "ENO" => {}
@@ -244,6 +268,8 @@ impl<'a> Checker<'_, 'a> {
         for (id, var) in (0u32..).map(VarId).zip(&info.vars) {
             let given = bound.inputs.iter().find(|(other, _)| *other == id).map(|(_, value)| *value);
             match var.class {
+                // The body runs only when EN is TRUE.
+                VarClass::Input if given.is_none() && is_en(self.an.text(var.symbol), var) => inputs.push((id, truth(span))),
                 VarClass::Input => match self.input_value(var, given, span) {
                     Some(value) => {
                         self.note_parameter((pou, id), &value);
@@ -266,7 +292,9 @@ impl<'a> Checker<'_, 'a> {
             span,
         });
         let eno = bound.eno.and_then(|(eno, _)| self.eno(eno));
-        sound.then(|| Call { target: pou, instance: None, en, eno, inputs, before: Vec::new(), inouts, after, span })
+        let eno_is_given = bound.declares_eno;
+        let before = Vec::new();
+        sound.then(|| Call { target: pou, instance: None, en, eno, eno_is_given, inputs, before, inouts, after, span })
     }
 
     fn input_value(&mut self, var: &VarInfo, given: Option<&'a ast::Expr>, span: Span) -> Option<Expr> {
@@ -405,6 +433,15 @@ impl<'a> Checker<'_, 'a> {
                 before.push(Rc::new(Stmt { kind: StmtKind::Assign { target, value }, span: given.span }));
             }
         }
+        // A body that runs finds its own EN and ENO TRUE.
+        for (id, var) in (0u32..).map(VarId).zip(&info.vars) {
+            let text = self.an.text(var.symbol);
+            let given = bound.inputs.iter().any(|(other, _)| *other == id);
+            if !given && (is_en(text, var) || is_eno(text, var)) {
+                let assign = |target| Rc::new(Stmt { kind: StmtKind::Assign { target, value: truth(span) }, span });
+                before.extend(field(var, span).map(assign));
+            }
+        }
         let mut inouts = Vec::new();
         for (id, var) in (0u32..).map(VarId).zip(&info.vars).filter(|(_, var)| var.class == VarClass::InOut) {
             let given = bound.inputs.iter().find(|(other, _)| *other == id).map(|(_, value)| *value);
@@ -418,7 +455,8 @@ impl<'a> Checker<'_, 'a> {
             field(var, span).unwrap_or(base)
         });
         let eno = bound.eno.and_then(|(eno, _)| self.eno(eno));
-        let instance = Some(instance);
-        sound.then(|| Call { target: pou, instance, en, eno, inputs: Vec::new(), before, inouts, after, span })
+        let (instance, eno_is_given) = (Some(instance), bound.declares_eno);
+        let inputs = Vec::new();
+        sound.then(|| Call { target: pou, instance, en, eno, eno_is_given, inputs, before, inouts, after, span })
     }
 }

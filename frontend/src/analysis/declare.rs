@@ -5,8 +5,9 @@ use std::rc::Rc;
 
 use khz_bytecode::value::BytePlace;
 
+use super::call::is_eno;
 use super::tree::{GlobalId, GlobalInfo, Located, PouId, PouInfo, VarClass, VarId, VarInfo};
-use super::types::{BOOL, FieldDef, Ty, TyKind, Value, elementary_by_name};
+use super::types::{BOOL, Const, FieldDef, Ty, TyKind, Value, elementary_by_name};
 use super::{Analyzer, ConstEntry, GlobalDecl, State, TypeEntry, TypeSource};
 use crate::diagnostics::{Diagnostic, semantic as rules};
 use crate::source::Span;
@@ -318,6 +319,10 @@ impl<'a> Analyzer<'a> {
             }
             let mut var = new_var(name, self.spelling(name), ty, class, init);
             var.constant = constant;
+            if pou.kind == PouKind::Function && is_eno(self.text(name.symbol), &var) {
+                // Its body runs only when EN is TRUE, and may take ENO back (6.6.1.7).
+                var.init = Value::Scalar(Const::Int(1));
+            }
             var.located = if at == 0 { self.located(decl, ty) } else { vars.last().and_then(|last| last.located) };
             if var.located.is_some() && pou.kind == PouKind::Function {
                 self.report(&rules::BAD_ADDRESS, decl.span, "a FUNCTION has no variables at fixed addresses");

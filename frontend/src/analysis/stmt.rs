@@ -4,6 +4,8 @@ use khz_bytecode::container::ElementaryType as E;
 use khz_bytecode::value::IntegerType;
 
 use super::expr::Checker;
+use khz_bytecode::limits::MAX_LOOP_DEPTH;
+
 use super::tree::{CaseArm, Expr, ExprKind, ForStmt, Place, Step, Stmt, StmtKind};
 use super::types::{Const, DINT, Ty, TyKind, integer_type, is_bits, is_integer, limits};
 use crate::diagnostics::{Diagnostic, semantic as names, types as rules};
@@ -55,20 +57,20 @@ impl<'a> Checker<'_, 'a> {
             }
             ast::StmtKind::For { variable, from, to, by, body, end_span } => {
                 let control = self.control(variable);
-                self.loop_depth += 1;
+                self.enter_loop(span);
                 let body = self.block(body);
                 self.loop_depth -= 1;
                 return self.for_loop(control?, (from, to, by.as_deref()), body, span, *end_span);
             }
             ast::StmtKind::While { condition, body, end_span } => {
-                self.loop_depth += 1;
+                self.enter_loop(span);
                 let condition = self.condition(condition);
                 let body = self.block(body);
                 self.loop_depth -= 1;
                 StmtKind::While { condition, body, end: *end_span }
             }
             ast::StmtKind::Repeat { body, until, .. } => {
-                self.loop_depth += 1;
+                self.enter_loop(span);
                 let body = self.block(body);
                 let until = self.condition(until);
                 self.loop_depth -= 1;
@@ -84,6 +86,15 @@ impl<'a> Checker<'_, 'a> {
             ast::StmtKind::Empty | ast::StmtKind::Error => return None,
         };
         Some(Stmt { kind, span })
+    }
+
+    /// Counts a loop; the verifier takes no more than a fixed nesting of them.
+    fn enter_loop(&mut self, span: Span) {
+        self.loop_depth += 1;
+        if self.loop_depth == u32::from(MAX_LOOP_DEPTH) + 1 {
+            let message = format!("loops nest more than {MAX_LOOP_DEPTH} levels deep");
+            self.an.report(&names::TOO_DEEP, span, message);
+        }
     }
 
     fn assign(&mut self, target: &'a ast::Expr, value: &'a ast::Expr, span: Span) -> Option<Stmt> {
@@ -200,7 +211,7 @@ impl<'a> Checker<'_, 'a> {
             return None;
         }
         // The loop's own reads and writes count as uses inside it.
-        self.loop_depth += 1;
+        self.enter_loop(variable.span);
         self.note_use(place.root, variable.span);
         self.loop_depth -= 1;
         Some(place)
@@ -265,20 +276,20 @@ fn skip_when_disabled(stmt: Stmt) -> Stmt {
         StmtKind::Assign { target, value: Expr { kind: ExprKind::Call(mut call), ty, span: at } }
             if call.en.is_some() || call.eno.is_some() =>
         {
-            let (en, eno) = (call.en.take(), call.eno.take());
+            let (en, eno, is_given) = (call.en.take(), call.eno.take(), call.eno_is_given);
             let value = Expr { kind: ExprKind::Call(call), ty, span: at };
-            guarded(en, eno.as_ref(), Stmt { kind: StmtKind::Assign { target, value }, span })
+            guarded(en, eno.as_ref(), is_given, Stmt { kind: StmtKind::Assign { target, value }, span })
         }
         StmtKind::Call(mut call) if call.en.is_some() || call.eno.is_some() => {
-            let (en, eno) = (call.en.take(), call.eno.take());
-            guarded(en, eno.as_ref(), Stmt { kind: StmtKind::Call(call), span })
+            let (en, eno, is_given) = (call.en.take(), call.eno.take(), call.eno_is_given);
+            guarded(en, eno.as_ref(), is_given, Stmt { kind: StmtKind::Call(call), span })
         }
         other => other,
     };
     Stmt { kind, span }
 }
 
-fn guarded(en: Option<Expr>, eno: Option<&Place>, inner: Stmt) -> StmtKind {
+fn guarded(en: Option<Expr>, eno: Option<&Place>, eno_is_given: bool, inner: Stmt) -> StmtKind {
     use super::types::BOOL;
     let span = inner.span;
     let set = |value: i64| {
@@ -289,6 +300,6 @@ fn guarded(en: Option<Expr>, eno: Option<&Place>, inner: Stmt) -> StmtKind {
     };
     let condition = en.unwrap_or(Expr { kind: ExprKind::Const(Const::Int(1)), ty: BOOL, span });
     let mut body = vec![inner];
-    body.extend(set(1));
+    body.extend(set(1).filter(|_| !eno_is_given));
     StmtKind::If { branches: vec![(condition, body)], otherwise: set(0).into_iter().collect() }
 }

@@ -531,6 +531,8 @@ pub struct Call {
     pub en: Option<Expr>,
     /// ENO.
     pub eno: Option<Place>,
+    /// The unit declares ENO itself, so after the call its own value counts.
+    pub eno_is_given: bool,
     /// For a function: values of its inputs in order of declaration. For a function block: empty.
     pub inputs: Vec<(VarId, Expr)>,
     /// For a function block: assignments to its inputs.

@@ -207,7 +207,7 @@ rules! {
         right ""
     }
     TOO_DEEP = "S0051" Error "nested too deep" {
-        "Types and declarations that depend on one another nest up to a fixed depth."
+        "Types, declarations that depend on one another, and loops nest up to a fixed depth."
         wrong ""
         right ""
     }
