@@ -10,7 +10,7 @@ use crate::run::Stop;
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Activation {
     /// Where it goes on: the operation behind the call.
-    pub return_position: usize,
+    pub return_position: u32,
     /// Position of its window in the register file.
     pub base: usize,
     /// Image offset of its frame bytes.
@@ -18,10 +18,10 @@ pub(crate) struct Activation {
 }
 
 /// The place of an operation in the container's code.
-fn place_of(program: &Program, position: usize) -> CodePlace {
+fn place_of(program: &Program, position: u32) -> CodePlace {
     // A container has at most 65,536 functions, so the position of one is an id.
     let function = FunctionId(program.function_at(position) as u16);
-    CodePlace { function, offset: program.origins.get(position).copied().unwrap_or(0) }
+    CodePlace { function, offset: program.origins.get(position as usize).copied().unwrap_or(0) }
 }
 
 /// The trap that a stop with these open calls is.

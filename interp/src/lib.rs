@@ -18,6 +18,7 @@ mod loops;
 mod memory;
 mod register_form;
 mod run;
+mod slots;
 mod translate;
 
 use std::sync::Arc;
@@ -32,9 +33,9 @@ use khz_machine::instance_map::InstanceMap;
 use khz_machine::trap::Trap;
 
 use calls::{Activation, trap_of};
-use memory::{Code, Registers};
 use register_form::Program;
 use run::{Surroundings, run};
+use slots::write_back;
 
 /// Choices at load.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -110,7 +111,6 @@ impl Engine for Interpreter {
     ///
     /// # Panics
     /// When `image` has another layout than the one given at load.
-    #[expect(unsafe_code, reason = "see below")]
     fn run(&mut self, entry: Entry, image: &mut Image, limits: Limits<'_>) -> Result<(), Trap> {
         assert!(*image.layout() == self.layout, "the image is not one of the resource that was loaded");
         let Some((function, instance)) = entry_function(self.verified.container(), entry) else { return Ok(()) };
@@ -128,15 +128,14 @@ impl Engine for Interpreter {
             max_depth: usize::from(self.verified.container().parameters.max_call_depth),
         };
         self.calls.clear();
-        // SAFETY: the translation ends each function with a return or a jump, and all its jumps go to blocks of the same function.
-        let code = unsafe { Code::new(&self.program.operations) };
-        // SAFETY: the translation names only registers below the window size in the function's entry, which each call enters with.
-        let mut registers = unsafe { Registers::new(&mut self.registers) };
         let function = self.program.functions[function.index()];
         // The register file was made for the deepest nesting, so the first window always fits.
-        assert!(registers.enter(0, function.registers), "the register file is too small for an entry");
-        run(function, &surroundings, image.bytes_mut(), code, registers, &mut self.calls, limits.fuel)
-            .map_err(|stop| trap_of(&stop, &self.program, &self.calls))
+        let (cursor, registers) = memory::start(&self.program, function, &mut self.registers)
+            .expect("the register file has room for an entry");
+        run(&surroundings, image.bytes_mut(), cursor, registers, &mut self.calls, limits.fuel).map_err(|stop| {
+            write_back(&stop, &surroundings, &self.calls, &self.registers, image.bytes_mut());
+            trap_of(&stop, &self.program, &self.calls)
+        })
     }
 
     fn code_bytes(&self) -> usize {

@@ -6,38 +6,88 @@
 
 use std::marker::PhantomData;
 
-use crate::register_form::Operation;
+use crate::register_form::{FunctionEntry, Operation, Program};
 
 /// Whether register and operation numbers are checked.
 const CHECKED: bool = cfg!(any(debug_assertions, feature = "checked"));
 
-/// The operations of a program.
-#[derive(Clone, Copy)]
-pub(crate) struct Code<'a> {
-    operations: &'a [Operation],
+/// Where the run stands in the operations of a program: the next operation.
+///
+/// A pointer instead of a number, so that fetching needs no arithmetic but the step itself.
+pub(crate) struct Cursor<'a> {
+    start: *const Operation,
+    count: usize,
+    next: *const Operation,
+    operations: PhantomData<&'a [Operation]>,
 }
 
-impl<'a> Code<'a> {
-    /// The operations.
+impl<'a> Cursor<'a> {
+    /// In front of the operation at `position`.
     ///
     /// # Safety
-    /// Control flow that starts at a function's first operation must never leave `operations`: each jump target lies inside, and the
-    /// last operation of each function ends the call or jumps.
+    /// Control flow that starts there must never leave `program.operations`: each jump target lies inside, the last operation of
+    /// each function ends the call or jumps, and operations have the data behind them that they ask for with `fetch`.
     #[expect(unsafe_code, reason = "see the head of this file")]
-    pub(crate) unsafe fn new(operations: &'a [Operation]) -> Self {
-        Code { operations }
+    unsafe fn new(program: &'a Program, position: u32) -> Self {
+        let operations = program.operations.as_slice();
+        let start = operations.as_ptr();
+        let mut cursor = Cursor { start, count: operations.len(), next: start, operations: PhantomData };
+        cursor.jump(position);
+        cursor
     }
 
-    /// The operation at a position.
+    /// The same place.
+    #[inline(always)]
+    pub(crate) fn copy(&self) -> Self {
+        Cursor { start: self.start, count: self.count, next: self.next, operations: PhantomData }
+    }
+
+    /// The next operation, and steps over it.
     #[inline(always)]
     #[expect(unsafe_code, reason = "see the head of this file")]
-    pub(crate) fn fetch(&self, position: usize) -> &'a Operation {
+    pub(crate) fn fetch(&mut self) -> &'a Operation {
         if CHECKED {
-            return &self.operations[position];
+            assert!((self.position() as usize) < self.count, "an operation outside the program");
         }
         // SAFETY: the caller of `new` promised that control flow stays inside.
-        unsafe { self.operations.get_unchecked(position) }
+        let operation = unsafe { &*self.next };
+        // SAFETY: `next` is inside, so the place behind it is inside or at the end.
+        self.next = unsafe { self.next.add(1) };
+        operation
     }
+
+    /// Goes to a position.
+    #[inline(always)]
+    #[expect(unsafe_code, reason = "see the head of this file")]
+    pub(crate) fn jump(&mut self, position: u32) {
+        if CHECKED {
+            assert!((position as usize) < self.count, "a jump outside the program");
+        }
+        // SAFETY: the caller of `new` promised that jump targets are inside.
+        self.next = unsafe { self.start.add(position as usize) };
+    }
+
+    /// Position of the next operation.
+    #[inline(always)]
+    pub(crate) fn position(&self) -> u32 {
+        // A program has fewer than 2^32 operations: operands name them with 32 bits.
+        ((self.next.addr() - self.start.addr()) / size_of::<Operation>()) as u32
+    }
+}
+
+/// The cursor and the registers for a run from the start of `function`. None when the register file is too short for it.
+#[expect(unsafe_code, reason = "see the head of this file")]
+pub(crate) fn start<'a>(
+    program: &'a Program,
+    function: FunctionEntry,
+    file: &'a mut [u64],
+) -> Option<(Cursor<'a>, Registers<'a>)> {
+    // SAFETY: the translation ends each function with a return or a jump, all its jumps go to blocks of the same function, and it puts
+    // the data of an operation behind it. A `Program` comes from the translation only.
+    let cursor = unsafe { Cursor::new(program, function.start) };
+    // SAFETY: the translation names only registers below the window size in the function's entry, which each call enters with.
+    let mut registers = unsafe { Registers::new(file) };
+    registers.enter(0, function.registers).then_some((cursor, registers))
 }
 
 /// The register file, seen through the window of the running call.
@@ -58,7 +108,7 @@ impl<'a> Registers<'a> {
     /// After each [`enter`](Self::enter) with `count` registers, `get` and `set` must be asked only for registers below `count` until the
     /// next `enter` or `leave`; each `leave` must go back to a base that was entered before.
     #[expect(unsafe_code, reason = "see the head of this file")]
-    pub(crate) unsafe fn new(file: &'a mut [u64]) -> Self {
+    unsafe fn new(file: &'a mut [u64]) -> Self {
         let start = file.as_mut_ptr();
         Registers { start, count: file.len(), window: start, file: PhantomData }
     }
@@ -126,10 +176,23 @@ impl<'a> Registers<'a> {
         unsafe { *self.at(register) = bits };
     }
 
+    /// `count` registers of the window from `first` on.
+    #[inline]
+    #[expect(unsafe_code, reason = "see the head of this file")]
+    pub(crate) fn range(&mut self, first: u32, count: u32) -> &mut [u64] {
+        if CHECKED {
+            assert!(self.base() + first as usize + count as usize <= self.count, "registers outside the register file");
+        }
+        // SAFETY: as in `at`; the caller of `new` promised that all of them are in the window.
+        let start = unsafe { self.window.add(first as usize) };
+        // SAFETY: they lie in the file, which this borrows for writing.
+        unsafe { std::slice::from_raw_parts_mut(start, count as usize) }
+    }
+
     /// Zeroes `count` registers from `first` on.
     #[inline]
     pub(crate) fn zero(&mut self, first: u32, count: u32) {
-        (first..first + count).for_each(|register| self.set(register, 0));
+        self.range(first, count).fill(0);
     }
 
     /// Moves `count` registers from `first` on to the window's start.

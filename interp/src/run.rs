@@ -15,9 +15,10 @@ use khz_machine::semantics;
 use crate::calls::Activation;
 use crate::helpers::run_helper;
 use crate::loops::{enter_loop, next_pass};
-use crate::memory::{Code as Operations, Lane, Registers, Scalar};
+use crate::memory::{Cursor, Lane, Registers, Scalar};
 use crate::register_form::table::for_each_operation;
-use crate::register_form::{Code, ElementAccess, FunctionEntry, Program};
+use crate::register_form::{Code, FunctionEntry, Operation, Program};
+use crate::slots::{bring, put_back};
 
 /// What a run works with, fixed while it lasts.
 pub(crate) struct Surroundings<'a> {
@@ -41,26 +42,30 @@ pub(crate) struct Surroundings<'a> {
     pub max_depth: usize,
 }
 
-/// A trap before its place is looked up: position of the operation, what happened.
+/// A trap before its place is looked up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Stop {
     /// The operation that trapped.
-    pub position: usize,
+    pub position: u32,
+    /// Where the running call's window starts in the register file.
+    pub base: usize,
     /// Why.
     pub code: TrapCode,
     /// What explains it.
     pub values: [i64; 3],
 }
 
-/// The image offset of an element, counted from `base`.
+/// Distance of an element from the first one in bytes; `data` is an element's bounds and stride as the translation laid them behind an
+/// operation: `a` lower bound, `b` upper bound - lower bound, `x` stride.
 #[inline(always)]
-pub(crate) fn element_offset(access: &ElementAccess, base: u64, index: i32) -> Result<usize, [i64; 3]> {
-    match semantics::array_position(index, access.lower, access.upper) {
-        Some(position) => Ok((base
-            .wrapping_add(u64::from(access.offset))
-            .wrapping_add(u64::from(position) * u64::from(access.stride))) as usize),
-        None => Err([i64::from(index), i64::from(access.lower), i64::from(access.upper)]),
+fn element_distance(data: &Operation, index: i32) -> Result<u64, [i64; 3]> {
+    let position = (index as u32).wrapping_sub(data.a);
+    if position > data.b {
+        let lower = i64::from(data.a as i32);
+        return Err([i64::from(index), lower, lower + i64::from(data.b)]);
     }
+    // The element is inside an array, whose size the verifier held to 32 bits.
+    Ok(u64::from(position.wrapping_mul(u32::from(data.x as u16))))
 }
 
 /// The last operand of an operation that carries it itself.
@@ -97,13 +102,13 @@ macro_rules! compute {
 
 /// The value of a numeric function, or the end of the run.
 macro_rules! value_or_stop {
-    (total, $result:expr, $pc:ident) => {
+    (total, $result:expr) => {
         $result
     };
-    (divide, $result:expr, $pc:ident) => {
+    (divide, $result:expr) => {
         match $result {
             Ok(value) => value,
-            Err(code) => return Err(Stop { position: $pc - 1, code, values: [0; 3] }),
+            Err(code) => break (code, [0; 3]),
         }
     };
 }
@@ -112,8 +117,10 @@ macro_rules! define_run {
     (
         [$(($opcode:literal, $variant:ident, $function:ident, $mnemonic:literal, [$($operand:ident)*] -> $result:ident, $traps:ident, $cost:literal, $doc:literal)),*]
         [$(($storage:ident, $ty:ty, $load:ident, $load_based:ident, $load_element:ident, $load_element_based:ident,
-            $store:ident, $store_based:ident, $store_element:ident, $store_element_based:ident)),*]
-        [$(($float:ident, $float_ty:ty, $canonical:ident, $foreign:ident, $foreign_based:ident, $foreign_element:ident, $foreign_element_based:ident)),*]
+            $load_plane:ident, $load_plane_based:ident, $store:ident, $store_based:ident, $store_element:ident,
+            $store_element_based:ident, $store_plane:ident, $store_plane_based:ident)),*]
+        [$(($float:ident, $float_ty:ty, $canonical:ident, $foreign:ident, $foreign_based:ident, $foreign_element:ident, $foreign_element_based:ident,
+            $foreign_plane:ident, $foreign_plane_based:ident)),*]
         [$(($compare:ident, $compare_function:ident, [$($compare_operand:ident)*], $if_:ident, $unless:ident, $if_const:ident, $unless_const:ident)),*]
     ) => {
         /// Runs from the start of `function` until it returns.
@@ -124,51 +131,76 @@ macro_rules! define_run {
         /// Where and why it was abandoned.
         #[allow(clippy::too_many_lines, reason = "one arm an operation: a dispatch loop is one function")]
         pub(crate) fn run(
-            function: FunctionEntry,
             surroundings: &Surroundings<'_>,
             memory: &mut [u8],
-            operations: Operations<'_>,
+            cursor: Cursor<'_>,
             mut registers: Registers<'_>,
             calls: &mut Vec<Activation>,
             mut fuel: Option<&mut Fuel>,
         ) -> Result<(), Stop> {
             let program = surroundings.program;
-            // A copy of its own, so that the window stays in a machine register: arguments of this size arrive in memory.
+            // Copies of their own, so that both pointers stay in machine registers: arguments of this size arrive in memory.
             let mut registers = registers.lend();
+            let mut cursor = cursor.copy();
             let deadline: &AtomicU32 = surroundings.deadline.as_atomic();
-            let mut pc = function.start as usize;
             let mut frame = surroundings.frame_start;
 
-            macro_rules! stop {
-                ($code:expr, $values:expr) => { return Err(Stop { position: pc - 1, code: $code, values: $values }) };
-            }
             macro_rules! check_deadline {
                 () => {
                     if deadline.load(Ordering::Relaxed) != 0 && let Some(code) = surroundings.deadline.expired() {
-                        stop!(code, [0; 3]);
+                        break (code, [0; 3]);
                     }
                 };
             }
+            // Image offset of an element; its bounds and stride stand behind the operation.
             macro_rules! element {
-                (image, $op:ident) => {{
-                    let access = &program.elements[$op.b as usize];
-                    match element_offset(access, 0, registers.get($op.a) as i32) {
-                        Ok(at) => at,
-                        Err(values) => stop!(TrapCode::ArrayIndex, values),
+                ($op:ident, $base:expr) => {{
+                    let data = cursor.fetch();
+                    let index = (registers.get($op.a) as i32).wrapping_add(i32::from($op.x));
+                    match element_distance(data, index) {
+                        Ok(distance) => ($base + u64::from(data.dst) + distance) as usize,
+                        Err(values) => break (TrapCode::ArrayIndex, values),
                     }
                 }};
-                (based, $op:ident) => {{
-                    let access = &program.elements[$op.b as usize];
-                    match element_offset(access, registers.get(access.base), registers.get($op.a) as i32) {
-                        Ok(at) => at,
-                        Err(values) => stop!(TrapCode::ArrayIndex, values),
+            }
+            // The same for two dimensions; the second one's data names the register of its index.
+            macro_rules! plane_element {
+                ($op:ident, $base:expr) => {{
+                    let data = cursor.fetch();
+                    let inner = cursor.fetch();
+                    match element_distance(data, registers.get($op.a) as i32) {
+                        Ok(distance) => match element_distance(inner, registers.get(inner.dst) as i32) {
+                            Ok(inner_distance) => ($base + u64::from(data.dst) + distance + inner_distance) as usize,
+                            Err(values) => break (TrapCode::ArrayIndex, values),
+                        },
+                        Err(values) => break (TrapCode::ArrayIndex, values),
+                    }
+                }};
+            }
+            // The reference in a register: references are image offsets, which have 31 bits.
+            macro_rules! reference {
+                ($register:expr) => { u64::from(registers.get($register) as u32) };
+            }
+            macro_rules! jump_if {
+                ($condition:expr, $op:ident) => { if $condition { cursor.jump($op.dst); } };
+            }
+            // Ends a pass of a FOR loop: `control` is the place of its variable before.
+            macro_rules! next_pass {
+                ($op:ident, $narrow:ty, $control:expr, |$next:ident| $keep:expr) => {{
+                    let sum = $control + i64::from($op.x);
+                    let $next = i32::from(sum as $narrow);
+                    $keep;
+                    let bound = i64::from(registers.get($op.b) as i32);
+                    if if $op.x > 0 { sum <= bound } else { sum >= bound } {
+                        cursor.jump($op.dst);
+                        check_deadline!();
                     }
                 }};
             }
             macro_rules! based {
-                ($register:expr, $offset:expr) => { registers.get($register).wrapping_add(u64::from($offset)) as usize };
+                ($register:expr, $offset:expr) => { (reference!($register) + u64::from($offset)) as usize };
             }
-            // Opens a call whose window starts at register `a`; the stop names the call, which is the operation before `pc`.
+            // Opens a call whose window starts at register `a`; the stop names the call, which is the operation that was fetched last.
             macro_rules! call {
                 ($op:ident, $callee:expr) => {{
                     let callee: FunctionEntry = program.functions[$callee];
@@ -176,15 +208,15 @@ macro_rules! define_run {
                     let depth = calls.len() + 2;
                     let base = registers.base() + $op.a as usize;
                     if depth > surroundings.max_depth || callee_frame + callee.frame_bytes > surroundings.frame_end {
-                        stop!(TrapCode::CallDepth, [depth as i64, 0, 0]);
+                        break (TrapCode::CallDepth, [depth as i64, 0, 0]);
                     }
                     let caller_base = registers.base();
                     if !registers.enter(base, callee.registers) {
-                        stop!(TrapCode::CallDepth, [depth as i64, 0, 0]);
+                        break (TrapCode::CallDepth, [depth as i64, 0, 0]);
                     }
-                    calls.push(Activation { return_position: pc, base: caller_base, frame });
+                    calls.push(Activation { return_position: cursor.position(), base: caller_base, frame });
                     frame = callee_frame;
-                    pc = callee.start as usize;
+                    cursor.jump(callee.start);
                 }};
             }
             macro_rules! leave {
@@ -194,35 +226,42 @@ macro_rules! define_run {
                         Some(caller) => {
                             registers.leave(caller.base);
                             frame = caller.frame;
-                            pc = caller.return_position;
+                            cursor.jump(caller.return_position);
                         }
                     }
                 };
             }
 
-            loop {
-                let op = operations.fetch(pc);
-                pc += 1;
+            let (code, values) = loop {
+                let op = cursor.fetch();
                 match op.code {
                     $(
                         Code::$variant => {
                             let result = compute!(registers, $function, [$($operand)*], registers, program, op);
-                            registers.set(op.dst, value_or_stop!($traps, result, pc).into_bits());
+                            registers.set(op.dst, value_or_stop!($traps, result).into_bits());
                         }
                         Code::$function => {
                             let result = compute!(own, $function, [$($operand)*], registers, program, op);
-                            registers.set(op.dst, value_or_stop!($traps, result, pc).into_bits());
+                            registers.set(op.dst, value_or_stop!($traps, result).into_bits());
                         }
                     )*
                     $(
                         Code::$load => registers.set(op.dst, <$ty as Scalar>::load(memory, op.a as usize)),
                         Code::$load_based => registers.set(op.dst, <$ty as Scalar>::load(memory, based!(op.a, op.b))),
-                        Code::$load_element => registers.set(op.dst, <$ty as Scalar>::load(memory, element!(image, op))),
-                        Code::$load_element_based => registers.set(op.dst, <$ty as Scalar>::load(memory, element!(based, op))),
+                        Code::$load_element => registers.set(op.dst, <$ty as Scalar>::load(memory, element!(op, 0))),
+                        Code::$load_element_based => registers.set(op.dst, <$ty as Scalar>::load(memory, element!(op, reference!(op.b)))),
+                        Code::$load_plane => registers.set(op.dst, <$ty as Scalar>::load(memory, plane_element!(op, 0))),
+                        Code::$load_plane_based => {
+                            registers.set(op.dst, <$ty as Scalar>::load(memory, plane_element!(op, reference!(op.b))));
+                        }
+                        Code::$store_plane => <$ty as Scalar>::store(memory, plane_element!(op, 0), registers.get(op.dst)),
+                        Code::$store_plane_based => {
+                            <$ty as Scalar>::store(memory, plane_element!(op, reference!(op.b)), registers.get(op.dst));
+                        }
                         Code::$store => <$ty as Scalar>::store(memory, op.a as usize, registers.get(op.dst)),
                         Code::$store_based => <$ty as Scalar>::store(memory, based!(op.a, op.b), registers.get(op.dst)),
-                        Code::$store_element => <$ty as Scalar>::store(memory, element!(image, op), registers.get(op.dst)),
-                        Code::$store_element_based => <$ty as Scalar>::store(memory, element!(based, op), registers.get(op.dst)),
+                        Code::$store_element => <$ty as Scalar>::store(memory, element!(op, 0), registers.get(op.dst)),
+                        Code::$store_element_based => <$ty as Scalar>::store(memory, element!(op, reference!(op.b)), registers.get(op.dst)),
                     )*
                     $(
                         Code::$foreign => {
@@ -234,40 +273,32 @@ macro_rules! define_run {
                             registers.set(op.dst, semantics::$canonical(value).into_bits());
                         }
                         Code::$foreign_element => {
-                            let value = <$float_ty as Lane>::from_bits(<$float_ty as Scalar>::load(memory, element!(image, op)));
+                            let value = <$float_ty as Lane>::from_bits(<$float_ty as Scalar>::load(memory, element!(op, 0)));
                             registers.set(op.dst, semantics::$canonical(value).into_bits());
                         }
                         Code::$foreign_element_based => {
-                            let value = <$float_ty as Lane>::from_bits(<$float_ty as Scalar>::load(memory, element!(based, op)));
+                            let value = <$float_ty as Lane>::from_bits(<$float_ty as Scalar>::load(memory, element!(op, reference!(op.b))));
+                            registers.set(op.dst, semantics::$canonical(value).into_bits());
+                        }
+                        Code::$foreign_plane => {
+                            let value = <$float_ty as Lane>::from_bits(<$float_ty as Scalar>::load(memory, plane_element!(op, 0)));
+                            registers.set(op.dst, semantics::$canonical(value).into_bits());
+                        }
+                        Code::$foreign_plane_based => {
+                            let value = <$float_ty as Lane>::from_bits(<$float_ty as Scalar>::load(memory, plane_element!(op, reference!(op.b))));
                             registers.set(op.dst, semantics::$canonical(value).into_bits());
                         }
                     )*
                     $(
-                        Code::$if_ => {
-                            if compute!(registers, $compare_function, [$($compare_operand)*], registers, program, op) != 0 {
-                                pc = op.dst as usize;
-                            }
-                        }
-                        Code::$unless => {
-                            if compute!(registers, $compare_function, [$($compare_operand)*], registers, program, op) == 0 {
-                                pc = op.dst as usize;
-                            }
-                        }
-                        Code::$if_const => {
-                            if compute!(own, $compare_function, [$($compare_operand)*], registers, program, op) != 0 {
-                                pc = op.dst as usize;
-                            }
-                        }
-                        Code::$unless_const => {
-                            if compute!(own, $compare_function, [$($compare_operand)*], registers, program, op) == 0 {
-                                pc = op.dst as usize;
-                            }
-                        }
+                        Code::$if_ => jump_if!(compute!(registers, $compare_function, [$($compare_operand)*], registers, program, op) != 0, op),
+                        Code::$unless => jump_if!(compute!(registers, $compare_function, [$($compare_operand)*], registers, program, op) == 0, op),
+                        Code::$if_const => jump_if!(compute!(own, $compare_function, [$($compare_operand)*], registers, program, op) != 0, op),
+                        Code::$unless_const => jump_if!(compute!(own, $compare_function, [$($compare_operand)*], registers, program, op) == 0, op),
                     )*
                     Code::Enter => {
-                        check_deadline!();
                         registers.zero(op.dst, op.a);
                         memory[frame as usize..(frame + op.b) as usize].fill(0);
+                        check_deadline!();
                     }
                     Code::Header => check_deadline!(),
                     Code::Charge => {
@@ -276,7 +307,7 @@ macro_rules! define_run {
                                 Some(left) => fuel.left = left,
                                 None => {
                                     fuel.left = 0;
-                                    stop!(TrapCode::Watchdog, [0; 3]);
+                                    break (TrapCode::Watchdog, [0; 3]);
                                 }
                             }
                         }
@@ -287,8 +318,21 @@ macro_rules! define_run {
                     Code::Move => registers.set(op.dst, registers.get(op.a)),
                     Code::Constant => registers.set(op.dst, u64::from(op.a) | u64::from(op.b) << 32),
                     Code::Offset => registers.set(op.dst, based!(op.a, op.b) as u64),
-                    Code::Index => registers.set(op.dst, element!(image, op) as u64),
-                    Code::IndexBased => registers.set(op.dst, element!(based, op) as u64),
+                    Code::Index => registers.set(op.dst, element!(op, 0) as u64),
+                    Code::IndexBased => registers.set(op.dst, element!(op, reference!(op.b)) as u64),
+                    Code::IndexWide => {
+                        let base = if op.b == u32::MAX { 0 } else { reference!(op.b) };
+                        let data = cursor.fetch();
+                        let stride = cursor.fetch().a;
+                        let index = (registers.get(op.a) as i32).wrapping_add(i32::from(op.x));
+                        match element_distance(data, index) {
+                            Ok(position) => {
+                                let distance = u64::from((position as u32).wrapping_mul(stride));
+                                registers.set(op.dst, base + u64::from(data.dst) + distance);
+                            }
+                            Err(values) => break (TrapCode::ArrayIndex, values),
+                        }
+                    }
                     Code::LoadBit => registers.set(op.dst, u64::from(memory[op.a as usize] >> (op.b & 7) & 1)),
                     Code::StoreBit => {
                         let byte = &mut memory[op.a as usize];
@@ -299,7 +343,7 @@ macro_rules! define_run {
                         let address = registers.get(op.a) as i64;
                         match semantics::check_reference(surroundings.layout, address, op.b, op.x != 0) {
                             Some(at) => registers.set(op.dst, u64::from(at)),
-                            None => stop!(TrapCode::Reference, [address, 0, 0]),
+                            None => break (TrapCode::Reference, [address, 0, 0]),
                         }
                     }
                     Code::Copy => {
@@ -315,87 +359,65 @@ macro_rules! define_run {
                         let range = &program.ranges[op.b as usize];
                         let value = registers.get(op.a) as i64;
                         if !semantics::check_range(range.kind, value, range.lower, range.upper) {
-                            stop!(TrapCode::Range, semantics::range_values(range.kind, value, range.lower, range.upper));
+                            break (TrapCode::Range, semantics::range_values(range.kind, value, range.lower, range.upper));
                         }
                     }
                     Code::Helper => {
                         let capacities = program.capacities[op.b as usize];
                         run_helper(op, capacities, memory, &mut registers.lend());
                     }
-                    Code::Jump => pc = op.dst as usize,
+                    Code::Jump => cursor.jump(op.dst),
                     Code::Repeat => {
-                        pc = op.dst as usize;
+                        cursor.jump(op.dst);
                         check_deadline!();
                     }
-                    Code::JumpIf => {
-                        if registers.get(op.a) as u32 != 0 {
-                            pc = op.dst as usize;
-                        }
+                    Code::JumpIf => jump_if!(registers.get(op.a) as u32 != 0, op),
+                    Code::JumpUnless => jump_if!(registers.get(op.a) as u32 == 0, op),
+                    Code::JumpIfMasked => jump_if!(registers.get(op.a) as u32 & op.b != 0, op),
+                    Code::JumpUnlessMasked => jump_if!(registers.get(op.a) as u32 & op.b == 0, op),
+                    Code::AndNot => {
+                        let (first, second) = (registers.get(op.a) as u32, registers.get(op.b) as u32);
+                        registers.set(op.dst, u64::from(first & u32::from(second == 0)));
                     }
-                    Code::JumpUnless => {
-                        if registers.get(op.a) as u32 == 0 {
-                            pc = op.dst as usize;
-                        }
+                    Code::OrNot => {
+                        let (first, second) = (registers.get(op.a) as u32, registers.get(op.b) as u32);
+                        registers.set(op.dst, u64::from(first | u32::from(second == 0)));
                     }
                     Code::Switch => {
                         let case = (registers.get(op.a) as u32).min(op.dst - 1);
-                        pc = program.jump_table[(op.b + case) as usize] as usize;
+                        cursor.jump(program.jump_table[(op.b + case) as usize]);
                     }
                     Code::ForEnter => match enter_loop(&program.for_loops[op.a as usize], op.b, memory, &mut registers.lend()) {
                         Some(true) => {}
-                        Some(false) => pc = op.dst as usize,
-                        None => stop!(TrapCode::Range, [0; 3]),
+                        Some(false) => cursor.jump(op.dst),
+                        None => break (TrapCode::Range, [0; 3]),
                     },
                     Code::ForNext => {
                         if next_pass(&program.for_loops[op.a as usize], memory, &mut registers.lend()) {
-                            pc = op.dst as usize;
+                            cursor.jump(op.dst);
                             check_deadline!();
                         }
                     }
                     Code::ForNextI32 => {
-                        let (control, bound) = (registers.get(op.a) as i32, registers.get(op.b) as i32);
-                        let sum = i64::from(control) + i64::from(op.x);
-                        registers.set(op.a, (sum as i32).into_bits());
-                        if if op.x > 0 { sum <= i64::from(bound) } else { sum >= i64::from(bound) } {
-                            pc = op.dst as usize;
-                            check_deadline!();
-                        }
+                        next_pass!(op, i32, i64::from(registers.get(op.a) as i32), |next| registers.set(op.a, next.into_bits()));
                     }
                     Code::ForNextI16 => {
-                        let (control, bound) = (registers.get(op.a) as i32, registers.get(op.b) as i32);
-                        let sum = i64::from(control) + i64::from(op.x);
-                        registers.set(op.a, i32::from(sum as i16).into_bits());
-                        if if op.x > 0 { sum <= i64::from(bound) } else { sum >= i64::from(bound) } {
-                            pc = op.dst as usize;
-                            check_deadline!();
-                        }
+                        next_pass!(op, i16, i64::from(registers.get(op.a) as i32), |next| registers.set(op.a, next.into_bits()));
                     }
                     Code::ForNextProgramI32 => {
                         let at = (surroundings.program_base + op.a) as usize;
-                        let (control, bound) = (i32::load(memory, at) as i32, registers.get(op.b) as i32);
-                        let sum = i64::from(control) + i64::from(op.x);
-                        i32::store(memory, at, sum as u64);
-                        if if op.x > 0 { sum <= i64::from(bound) } else { sum >= i64::from(bound) } {
-                            pc = op.dst as usize;
-                            check_deadline!();
-                        }
+                        next_pass!(op, i32, i64::from(i32::load(memory, at) as i32), |next| i32::store(memory, at, next as u64));
                     }
                     Code::ForNextProgramI16 => {
                         let at = (surroundings.program_base + op.a) as usize;
-                        let (control, bound) = (i16::load(memory, at) as i32, registers.get(op.b) as i32);
-                        let sum = i64::from(control) + i64::from(op.x);
-                        i16::store(memory, at, sum as u64);
-                        if if op.x > 0 { sum <= i64::from(bound) } else { sum >= i64::from(bound) } {
-                            pc = op.dst as usize;
-                            check_deadline!();
-                        }
+                        next_pass!(op, i16, i64::from(i16::load(memory, at) as i32), |next| i16::store(memory, at, next as u64));
                     }
                     Code::Call => call!(op, op.b as usize),
                     Code::CallVirtual => {
                         let address = registers.get(op.a) as i64;
                         // The translation took the number from a method id, so it fits.
                         match surroundings.instances.find(address, MethodId(op.b as u16)) {
-                            None => stop!(TrapCode::Reference, [address, 0, 0]),
+                            None => break (TrapCode::Reference, [address, 0, 0]),
                             Some(function) => {
                                 call!(op, function.index());
                                 // The address is where the callee expects `this`, now register 0 of its window.
@@ -403,6 +425,16 @@ macro_rules! define_run {
                             }
                         }
                     }
+                    Code::BringSlots => {
+                        let runs = &program.slot_runs[op.a as usize..op.b as usize];
+                        bring(runs, surroundings.program_base, memory, &mut registers.lend());
+                    }
+                    Code::PutSlotsBack => {
+                        let runs = &program.slot_runs[op.a as usize..op.b as usize];
+                        put_back(runs, surroundings.program_base, memory, &mut registers.lend());
+                    }
+                    // Never reached: the operation in front of it fetches it.
+                    Code::Data => {}
                     Code::Return => leave!(),
                     Code::ReturnOne => {
                         registers.set(0, registers.get(op.a));
@@ -413,7 +445,8 @@ macro_rules! define_run {
                         leave!();
                     }
                 }
-            }
+            };
+            Err(Stop { position: cursor.position() - 1, base: registers.base(), code, values })
         }
     };
 }

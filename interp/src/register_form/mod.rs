@@ -36,8 +36,10 @@ macro_rules! define_code {
     (
         [$(($opcode:literal, $variant:ident, $function:ident, $mnemonic:literal, [$($operand:ident)*] -> $result:ident, $traps:ident, $cost:literal, $doc:literal)),*]
         [$(($storage:ident, $ty:ty, $load:ident, $load_based:ident, $load_element:ident, $load_element_based:ident,
-            $store:ident, $store_based:ident, $store_element:ident, $store_element_based:ident)),*]
-        [$(($float:ident, $float_ty:ty, $canonical:ident, $foreign:ident, $foreign_based:ident, $foreign_element:ident, $foreign_element_based:ident)),*]
+            $load_plane:ident, $load_plane_based:ident, $store:ident, $store_based:ident, $store_element:ident,
+            $store_element_based:ident, $store_plane:ident, $store_plane_based:ident)),*]
+        [$(($float:ident, $float_ty:ty, $canonical:ident, $foreign:ident, $foreign_based:ident, $foreign_element:ident, $foreign_element_based:ident,
+            $foreign_plane:ident, $foreign_plane_based:ident)),*]
         [$(($compare:ident, $compare_function:ident, [$($compare_operand:ident)*], $if_:ident, $unless:ident, $if_const:ident, $unless_const:ident)),*]
     ) => {
         /// What an operation does. Numeric rows appear twice: `I32Add` reads both operands from registers, `i32_add` takes the last one
@@ -47,8 +49,9 @@ macro_rules! define_code {
         #[repr(u16)]
         pub(crate) enum Code {
             $($variant, $function,)*
-            $($load, $load_based, $load_element, $load_element_based, $store, $store_based, $store_element, $store_element_based,)*
-            $($foreign, $foreign_based, $foreign_element, $foreign_element_based,)*
+            $($load, $load_based, $load_element, $load_element_based, $load_plane, $load_plane_based,
+            $store, $store_based, $store_element, $store_element_based, $store_plane, $store_plane_based,)*
+            $($foreign, $foreign_based, $foreign_element, $foreign_element_based, $foreign_plane, $foreign_plane_based,)*
             $($if_, $unless, $if_const, $unless_const,)*
             /// Start of a function: deadline; zeroes `a` registers from `dst` on and `b` frame bytes.
             Enter,
@@ -68,10 +71,26 @@ macro_rules! define_code {
             Constant,
             /// `dst` := reference `a` moved by `b` bytes.
             Offset,
-            /// `dst` := reference to element `a` (a register) of array access `b`, counted from the image's start.
+            /// `dst` := reference to the element with index `a` (a register) + `x` of the array that the data operation behind it
+            /// describes, counted from the image's start.
             Index,
-            /// As `Index`, counted from the access's base register.
+            /// As `Index`, counted from the reference in `b`.
             IndexBased,
+            /// As `IndexBased`, or as `Index` when `b` is `u32::MAX`, with a stride over 16 bits: the data says 1, and second data behind
+            /// it has the stride in `a`.
+            IndexWide,
+            /// Not run but read by the operation in front of it. One dimension of an array: `a` lower bound, `b` upper bound - lower
+            /// bound, `x` bytes from one element to the next (unsigned); `dst` for the first dimension the offset of the first element's
+            /// accessed part, for the second one the register of the index.
+            Data,
+            /// `dst` := `a` and (`b` = 0).
+            AndNot,
+            /// `dst` := `a` or (`b` = 0).
+            OrNot,
+            /// Brings the slots of rows `a` .. `b` of the slot runs into registers.
+            BringSlots,
+            /// Puts the written ones of these slots back into the image.
+            PutSlotsBack,
             /// `dst` := bit `b` of byte `a` of the image.
             LoadBit,
             /// Bit `b` of byte `a` of the image := `dst` <> 0.
@@ -94,6 +113,10 @@ macro_rules! define_code {
             JumpIf,
             /// Goes to `dst` if `a` (i32) is zero.
             JumpUnless,
+            /// Goes to `dst` if `a` (i32) has one of the bits `b`.
+            JumpIfMasked,
+            /// Goes to `dst` if `a` (i32) has none of the bits `b`.
+            JumpUnlessMasked,
             /// Goes to entry min(`a`, `dst` - 1) of the jump table from `b` on.
             Switch,
             /// Starts FOR loop number `a` with initial value, bound and step in the registers from `b` on; `dst` is its exit.
@@ -133,8 +156,14 @@ macro_rules! define_code {
         /// The operations on scalars of a storage.
         pub(crate) fn access_codes(storage: Storage) -> AccessCodes {
             match storage { $(Storage::$storage => AccessCodes {
-                load: LoadCodes { image: Code::$load, based: Code::$load_based, element: Code::$load_element, element_based: Code::$load_element_based },
-                store: LoadCodes { image: Code::$store, based: Code::$store_based, element: Code::$store_element, element_based: Code::$store_element_based },
+                load: LoadCodes {
+                    image: Code::$load, based: Code::$load_based, element: Code::$load_element, element_based: Code::$load_element_based,
+                    plane: Code::$load_plane, plane_based: Code::$load_plane_based,
+                },
+                store: LoadCodes {
+                    image: Code::$store, based: Code::$store_based, element: Code::$store_element, element_based: Code::$store_element_based,
+                    plane: Code::$store_plane, plane_based: Code::$store_plane_based,
+                },
             },)* }
         }
 
@@ -143,6 +172,7 @@ macro_rules! define_code {
             match storage {
                 $(Storage::$float => LoadCodes {
                     image: Code::$foreign, based: Code::$foreign_based, element: Code::$foreign_element, element_based: Code::$foreign_element_based,
+                    plane: Code::$foreign_plane, plane_based: Code::$foreign_plane_based,
                 },)*
                 _ => access_codes(storage).load,
             }
@@ -169,10 +199,14 @@ pub(crate) struct LoadCodes {
     pub image: Code,
     /// `a` is a register, `b` an offset.
     pub based: Code,
-    /// `a` is the register of an index, `b` an [`ElementAccess`] without base.
+    /// `a` is the register of an index, to which `x` is added; the array's dimension stands behind the operation as `Data`.
     pub element: Code,
-    /// As `element`, with a base.
+    /// As `element`; offsets count from the reference in `b`.
     pub element_based: Code,
+    /// As `element` with two dimensions; `x` is 0.
+    pub plane: Code,
+    /// As `plane`; offsets count from the reference in `b`.
+    pub plane_based: Code,
 }
 
 /// The operations on scalars of one storage.
@@ -184,19 +218,32 @@ pub(crate) struct AccessCodes {
     pub store: LoadCodes,
 }
 
-/// How an index becomes an image offset.
+/// Neighbouring slots of one storage that live in neighbouring registers while a function runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct ElementAccess {
-    /// Register that holds the array's reference, for operations with a base.
-    pub base: u32,
-    /// Image offset, or offset from the base, of the first element's accessed part.
+pub(crate) struct SlotRun {
+    /// Register of the first one.
+    pub register: u32,
+    /// How many.
+    pub count: u32,
+    /// Offset of the first one, from the image's start or from the program instance's slots.
     pub offset: u32,
-    /// Lower bound.
-    pub lower: i32,
-    /// Upper bound.
-    pub upper: i32,
-    /// Bytes from one element to the next.
-    pub stride: u32,
+    /// Whether the offset counts from the program instance's slots.
+    pub of_program: bool,
+    /// Whether the function writes them.
+    pub is_written: bool,
+    /// How they lie in memory.
+    pub storage: Storage,
+}
+
+/// Which slots live in registers while a function runs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct HeldSlots {
+    /// The first of its rows in the slot runs.
+    pub first: u32,
+    /// Behind the last of its rows.
+    pub end: u32,
+    /// Position of the operation that brings them.
+    pub brought_at: u32,
 }
 
 /// The operands of `check.i32` and `check.i64`.
@@ -256,8 +303,10 @@ pub(crate) struct Program {
     pub functions: Vec<FunctionEntry>,
     /// 64-bit operands.
     pub constants: Vec<u64>,
-    /// Array accesses.
-    pub elements: Vec<ElementAccess>,
+    /// Slots that live in registers, function behind function.
+    pub slot_runs: Vec<SlotRun>,
+    /// For each function its part of `slot_runs`.
+    pub held: Vec<HeldSlots>,
     /// Range checks.
     pub ranges: Vec<RangeCheck>,
     /// FOR loops.
@@ -276,7 +325,7 @@ impl Program {
         size_of_val(self.operations.as_slice())
             + size_of_val(self.functions.as_slice())
             + size_of_val(self.constants.as_slice())
-            + size_of_val(self.elements.as_slice())
+            + size_of_val(self.slot_runs.as_slice())
             + size_of_val(self.ranges.as_slice())
             + size_of_val(self.for_loops.as_slice())
             + size_of_val(self.jump_table.as_slice())
@@ -284,8 +333,8 @@ impl Program {
     }
 
     /// The function that an operation belongs to.
-    pub(crate) fn function_at(&self, position: usize) -> usize {
-        self.functions.partition_point(|function| function.start as usize <= position).saturating_sub(1)
+    pub(crate) fn function_at(&self, position: u32) -> usize {
+        self.functions.partition_point(|function| function.start <= position).saturating_sub(1)
     }
 
     /// The operations as text, one a line: for tests and for people who look for what to improve.

@@ -7,28 +7,40 @@
 ///
 /// - numeric row: as in [`khz_bytecode::for_each_numeric!`]; `Variant` takes its operands from registers, `function` (as a name of an
 ///   operation) takes its last operand from the operation itself;
-/// - access: `(Storage, type, LoadImage, LoadBased, LoadElementImage, LoadElementBased, StoreImage, StoreBased, StoreElementImage,
-///   StoreElementBased)`. *Image*: the place counts from the image's start; *based*: from a register;
-/// - canonical float load: the four loads of an access, where any NaN may stand;
+/// - access: `(Storage, type, LoadImage, LoadBased, LoadElementImage, LoadElementBased, LoadPlane, LoadPlaneBased,
+///   StoreImage, ...)`. *Image*: the place counts from the image's start; *based*: from a register; *element*: of an array of one
+///   dimension; *plane*: of two;
+/// - canonical float load: the six loads of an access, where any NaN may stand;
 /// - comparison: `(numeric variant, function, [operands], If, Unless, IfConst, UnlessConst)`.
 macro_rules! for_each_operation {
     (@own $callback:ident, [$($numeric:tt),*]) => {
         $callback! {
             [$($numeric),*]
             [
-                (Bool, bool, LoadBool, LoadBasedBool, LoadElementBool, LoadElementBasedBool, StoreBool, StoreBasedBool, StoreElementBool, StoreElementBasedBool),
-                (I8, i8, LoadI8, LoadBasedI8, LoadElementI8, LoadElementBasedI8, StoreI8, StoreBasedI8, StoreElementI8, StoreElementBasedI8),
-                (U8, u8, LoadU8, LoadBasedU8, LoadElementU8, LoadElementBasedU8, StoreU8, StoreBasedU8, StoreElementU8, StoreElementBasedU8),
-                (I16, i16, LoadI16, LoadBasedI16, LoadElementI16, LoadElementBasedI16, StoreI16, StoreBasedI16, StoreElementI16, StoreElementBasedI16),
-                (U16, u16, LoadU16, LoadBasedU16, LoadElementU16, LoadElementBasedU16, StoreU16, StoreBasedU16, StoreElementU16, StoreElementBasedU16),
-                (I32, i32, LoadI32, LoadBasedI32, LoadElementI32, LoadElementBasedI32, StoreI32, StoreBasedI32, StoreElementI32, StoreElementBasedI32),
-                (I64, i64, LoadI64, LoadBasedI64, LoadElementI64, LoadElementBasedI64, StoreI64, StoreBasedI64, StoreElementI64, StoreElementBasedI64),
-                (F32, f32, LoadF32, LoadBasedF32, LoadElementF32, LoadElementBasedF32, StoreF32, StoreBasedF32, StoreElementF32, StoreElementBasedF32),
-                (F64, f64, LoadF64, LoadBasedF64, LoadElementF64, LoadElementBasedF64, StoreF64, StoreBasedF64, StoreElementF64, StoreElementBasedF64)
+                (Bool, bool, LoadBool, LoadBasedBool, LoadElementBool, LoadElementBasedBool,
+                 LoadPlaneBool, LoadPlaneBasedBool, StoreBool, StoreBasedBool, StoreElementBool, StoreElementBasedBool, StorePlaneBool, StorePlaneBasedBool),
+                (I8, i8, LoadI8, LoadBasedI8, LoadElementI8, LoadElementBasedI8,
+                 LoadPlaneI8, LoadPlaneBasedI8, StoreI8, StoreBasedI8, StoreElementI8, StoreElementBasedI8, StorePlaneI8, StorePlaneBasedI8),
+                (U8, u8, LoadU8, LoadBasedU8, LoadElementU8, LoadElementBasedU8,
+                 LoadPlaneU8, LoadPlaneBasedU8, StoreU8, StoreBasedU8, StoreElementU8, StoreElementBasedU8, StorePlaneU8, StorePlaneBasedU8),
+                (I16, i16, LoadI16, LoadBasedI16, LoadElementI16, LoadElementBasedI16,
+                 LoadPlaneI16, LoadPlaneBasedI16, StoreI16, StoreBasedI16, StoreElementI16, StoreElementBasedI16, StorePlaneI16, StorePlaneBasedI16),
+                (U16, u16, LoadU16, LoadBasedU16, LoadElementU16, LoadElementBasedU16,
+                 LoadPlaneU16, LoadPlaneBasedU16, StoreU16, StoreBasedU16, StoreElementU16, StoreElementBasedU16, StorePlaneU16, StorePlaneBasedU16),
+                (I32, i32, LoadI32, LoadBasedI32, LoadElementI32, LoadElementBasedI32,
+                 LoadPlaneI32, LoadPlaneBasedI32, StoreI32, StoreBasedI32, StoreElementI32, StoreElementBasedI32, StorePlaneI32, StorePlaneBasedI32),
+                (I64, i64, LoadI64, LoadBasedI64, LoadElementI64, LoadElementBasedI64,
+                 LoadPlaneI64, LoadPlaneBasedI64, StoreI64, StoreBasedI64, StoreElementI64, StoreElementBasedI64, StorePlaneI64, StorePlaneBasedI64),
+                (F32, f32, LoadF32, LoadBasedF32, LoadElementF32, LoadElementBasedF32,
+                 LoadPlaneF32, LoadPlaneBasedF32, StoreF32, StoreBasedF32, StoreElementF32, StoreElementBasedF32, StorePlaneF32, StorePlaneBasedF32),
+                (F64, f64, LoadF64, LoadBasedF64, LoadElementF64, LoadElementBasedF64,
+                 LoadPlaneF64, LoadPlaneBasedF64, StoreF64, StoreBasedF64, StoreElementF64, StoreElementBasedF64, StorePlaneF64, StorePlaneBasedF64)
             ]
             [
-                (F32, f32, canonical_f32, LoadForeignF32, LoadForeignBasedF32, LoadForeignElementF32, LoadForeignElementBasedF32),
-                (F64, f64, canonical_f64, LoadForeignF64, LoadForeignBasedF64, LoadForeignElementF64, LoadForeignElementBasedF64)
+                (F32, f32, canonical_f32, LoadForeignF32, LoadForeignBasedF32, LoadForeignElementF32, LoadForeignElementBasedF32,
+                 LoadForeignPlaneF32, LoadForeignPlaneBasedF32),
+                (F64, f64, canonical_f64, LoadForeignF64, LoadForeignBasedF64, LoadForeignElementF64, LoadForeignElementBasedF64,
+                 LoadForeignPlaneF64, LoadForeignPlaneBasedF64)
             ]
             [
                 (I32Eq, i32_eq, [I32 I32], IfI32Eq, UnlessI32Eq, IfI32EqConst, UnlessI32EqConst),

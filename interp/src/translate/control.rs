@@ -49,6 +49,13 @@ impl Translator<'_> {
             _ => None,
         };
         if let Some(last) = computed
+            && let Some(tested) = self.masked_test(&last)
+        {
+            let code = if tested.1 == when { Code::JumpIfMasked } else { Code::JumpUnlessMasked };
+            self.settle_all();
+            return self.branch_to(Operation { code, x: 0, dst: 0, a: tested.0.a, b: tested.0.b }, block, 0);
+        }
+        if let Some(last) = computed
             && let Some((if_, unless)) = branch_codes(last.code)
         {
             self.remove_last();
@@ -67,6 +74,30 @@ impl Translator<'_> {
         self.settle_all();
         let code = if when { Code::JumpIf } else { Code::JumpUnless };
         self.branch_to(Operation { code, x: 0, dst: 0, a, b: 0 }, block, 0);
+    }
+
+    /// For a condition that `last` computes as some bits of a register being set (true) or not (false): takes the operations back and
+    /// gives the `and`.
+    fn masked_test(&mut self, last: &Operation) -> Option<(Operation, bool)> {
+        let is_set = match last.code {
+            Code::i32_and => {
+                self.remove_last();
+                return Some((*last, true));
+            }
+            Code::i32_ne if last.b == 0 => true,
+            Code::I32Nez => true,
+            Code::i32_eq if last.b == 0 => false,
+            Code::I32Eqz => false,
+            _ => return None,
+        };
+        // The `and` stands right before, in a register of its own that only `last` reads.
+        let before = self.value_before_last().filter(|and| and.code == Code::i32_and && and.dst == last.a)?;
+        if last.a < self.registers.stack || last.a != last.dst {
+            return None;
+        }
+        self.remove_last();
+        self.remove_last();
+        Some((before, is_set))
     }
 
     pub(super) fn switch(&mut self, targets: &[Label]) {
@@ -90,6 +121,9 @@ impl Translator<'_> {
         let (base, offset) = match descriptor.control {
             ControlPlace::Slot(SlotPlace::Local, index) => {
                 return self.for_access_at(id, Control::Register(self.local_register(index)));
+            }
+            ControlPlace::Slot(place, index) if let Some(held) = self.held.find(place, index) => {
+                return self.for_access_at(id, Control::Register(held.register));
             }
             ControlPlace::Slot(place, index) => self.slot_address(place, index),
             ControlPlace::Bytes(place, offset) => {
@@ -213,6 +247,10 @@ impl Translator<'_> {
                 Operation { code: Code::ReturnMany, x: 0, dst: 0, a: self.registers.stack, b }
             }
         };
+        let held = self.program.held.last().copied().unwrap_or_default();
+        if self.held.runs.iter().any(|run| run.is_written) {
+            self.effect(Operation { code: Code::PutSlotsBack, x: 0, dst: 0, a: held.first, b: held.end });
+        }
         self.effect(operation);
     }
 }

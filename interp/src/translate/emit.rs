@@ -2,7 +2,10 @@
 
 use khz_bytecode::ids::Label;
 
+use khz_bytecode::value::{LocalType, Storage};
+
 use super::Translator;
+use super::numeric::is_wrapped;
 use crate::register_form::{Code, Operation};
 
 /// A jump target to be filled in when all blocks have their places.
@@ -25,10 +28,63 @@ pub(super) enum PatchPlace {
     Table(usize),
 }
 
+/// Operand stack registers that are known to hold 0 or 1: forgotten at the start of each block.
+#[derive(Debug, Clone, Default)]
+pub(super) struct KnownBools {
+    /// By depth: the age in which it was found out.
+    found: Vec<u32>,
+    age: u32,
+}
+
+impl KnownBools {
+    /// Nothing is known any more.
+    pub(super) fn forget(&mut self) {
+        self.age += 1;
+    }
+
+    fn set(&mut self, depth: usize, is_bool: bool) {
+        if self.found.len() <= depth {
+            self.found.resize(depth + 1, 0);
+        }
+        self.found[depth] = if is_bool { self.age } else { 0 };
+    }
+
+    fn get(&self, depth: usize) -> bool {
+        self.age > 0 && self.found.get(depth) == Some(&self.age)
+    }
+}
+
 impl Translator<'_> {
+    /// Whether a register holds 0 or 1.
+    pub(super) fn is_bool(&self, register: u32) -> bool {
+        if let Some(depth) = register.checked_sub(self.registers.stack) {
+            return self.bools.get(depth as usize);
+        }
+        if let Some(storage) = self.held.storage(register) {
+            return storage == Storage::Bool;
+        }
+        let local = register.checked_sub(self.registers.locals).and_then(|l| self.function.locals.get(l as usize));
+        local == Some(&LocalType::Scalar(Storage::Bool))
+    }
+
+    /// Whether an operation's result is 0 or 1.
+    pub(super) fn gives_bool(&self, operation: &Operation) -> bool {
+        match operation.code {
+            Code::I32And => self.is_bool(operation.a) || self.is_bool(operation.b),
+            Code::AndNot | Code::Move => self.is_bool(operation.a),
+            Code::I32Or | Code::I32Xor => self.is_bool(operation.a) && self.is_bool(operation.b),
+            Code::OrNot => self.is_bool(operation.a),
+            Code::i32_and => operation.b <= 1,
+            Code::i32_xor => operation.b <= 1 && self.is_bool(operation.a),
+            Code::Constant => operation.a <= 1 && operation.b == 0,
+            code => is_wrapped(code, Storage::Bool),
+        }
+    }
+
     fn append(&mut self, operation: Operation, origin: u32) {
         self.program.operations.push(operation);
         self.program.origins.push(origin);
+        self.data_behind = 0;
     }
 
     /// Appends an operation whose only effect is to write register `dst` from other operands: a later one may redirect it.
@@ -38,8 +94,18 @@ impl Translator<'_> {
 
     /// As [`Self::value`], for a trap that belongs to the instruction at `origin`.
     pub(super) fn value_from(&mut self, operation: Operation, origin: u32) {
+        if let Some(depth) = operation.dst.checked_sub(self.registers.stack) {
+            let is_bool = self.gives_bool(&operation);
+            self.bools.set(depth as usize, is_bool);
+        }
         self.append(operation, origin);
         self.last_result = Some(operation.dst);
+    }
+
+    /// Appends the data that the operation just appended fetches.
+    pub(super) fn data(&mut self, data: &[Operation], origin: u32) {
+        data.iter().for_each(|data| self.append(*data, origin));
+        self.data_behind = data.len();
     }
 
     /// Appends any other operation.
@@ -49,6 +115,10 @@ impl Translator<'_> {
 
     /// As [`Self::effect`], for a trap that belongs to the instruction at `origin`.
     pub(super) fn effect_from(&mut self, operation: Operation, origin: u32) {
+        // What writes a register of the operand stack among other effects.
+        if matches!(operation.code, Code::SelectUnless | Code::Helper | Code::Call | Code::CallVirtual) {
+            self.bools.forget();
+        }
         self.append(operation, origin);
         self.last_result = None;
     }
@@ -56,21 +126,40 @@ impl Translator<'_> {
     /// The last operation, when it just computed `register` and nothing else.
     pub(super) fn last_value(&self, register: u32) -> Option<Operation> {
         self.last_result.filter(|last| *last == register)?;
-        self.program.operations.last().copied()
+        self.last_position().map(|at| self.program.operations[at])
+    }
+
+    /// The operation before the last one, when that one just computed its result from it and both stand in this block.
+    pub(super) fn value_before_last(&self) -> Option<Operation> {
+        let before = self.last_position()?.checked_sub(1).filter(|at| *at >= self.block_starts[self.block] as usize)?;
+        self.program.operations.get(before).copied()
+    }
+
+    /// Position of the last operation that is no data.
+    fn last_position(&self) -> Option<usize> {
+        self.program.operations.len().checked_sub(1 + self.data_behind)
     }
 
     /// Redirects the last operation to write `register` instead.
     pub(super) fn redirect_last(&mut self, register: u32) {
-        if let Some(last) = self.program.operations.last_mut() {
-            last.dst = register;
+        if let Some(at) = self.last_position() {
+            self.program.operations[at].dst = register;
+            if let Some(depth) = register.checked_sub(self.registers.stack) {
+                let last = self.program.operations[at];
+                let is_bool = self.gives_bool(&last);
+                self.bools.set(depth as usize, is_bool);
+            }
             self.last_result = Some(register);
         }
     }
 
     /// Takes the last operation back.
     pub(super) fn remove_last(&mut self) {
-        self.program.operations.pop();
-        self.program.origins.pop();
+        if let Some(at) = self.last_position() {
+            self.program.operations.truncate(at);
+            self.program.origins.truncate(at);
+        }
+        self.data_behind = 0;
         self.last_result = None;
     }
 

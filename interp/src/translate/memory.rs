@@ -8,8 +8,8 @@ use khz_bytecode::value::{BytePlace, LocalType, SlotPlace, Storage};
 
 use super::Translator;
 use super::numeric::{is_wrapped, wrap_code, wrap_constant};
-use super::stack::{Base, Element, Entry, Pending};
-use crate::register_form::{Code, ElementAccess, LoadCodes, Operation, access_codes, foreign_load_codes};
+use super::stack::{Base, Dimension, Element, Entry, Pending};
+use crate::register_form::{Code, LoadCodes, Operation, access_codes, foreign_load_codes};
 
 impl Translator<'_> {
     /// Where a byte place starts.
@@ -61,6 +61,9 @@ impl Translator<'_> {
     }
 
     pub(super) fn slot_load(&mut self, place: SlotPlace, index: SlotIndex) {
+        if let Some(held) = self.held.find(place, index) {
+            return self.push(Pending::Register(held.register));
+        }
         if let Some(storage) = self.memory_slot(place, index) {
             let (base, offset) = self.slot_address(place, index);
             return self.scalar_load(access_codes(storage).load, base, offset);
@@ -70,18 +73,30 @@ impl Translator<'_> {
     }
 
     pub(super) fn slot_store(&mut self, place: SlotPlace, index: SlotIndex) {
+        if let Some(held) = self.held.find(place, index) {
+            // A trap puts it back into the image, so an index check that was asked for before comes before.
+            self.settle_elements();
+            return self.register_store(held.register, held.storage);
+        }
         if let Some(storage) = self.memory_slot(place, index) {
             let (base, offset) = self.slot_address(place, index);
             return self.scalar_store(storage, base, offset);
         }
         let register = self.local_register(index);
+        if let LocalType::Scalar(storage) = self.function.locals[index.index()] {
+            return self.register_store(register, storage);
+        }
+        let (entry, _) = self.pop();
+        self.settle_readers(register);
+        // A reference: assigning one makes its pending index check, in the order of the instructions.
+        self.settle_elements();
+        self.compute(&entry.value, register);
+    }
+
+    /// Stores the top to a slot that is a register.
+    fn register_store(&mut self, register: u32, storage: Storage) {
         let (entry, own) = self.pop();
         self.settle_readers(register);
-        let LocalType::Scalar(storage) = self.function.locals[index.index()] else {
-            // A reference: assigning one makes its pending index check, in the order of the instructions.
-            self.settle_elements();
-            return self.compute(&entry.value, register);
-        };
         let computed = match entry.value {
             Pending::Register(source) if source == own => self.last_value(own),
             _ => None,
@@ -91,13 +106,23 @@ impl Translator<'_> {
                 self.compute(&Pending::Constant(wrap_constant(storage, bits)), register);
             }
             (_, None) if computed.is_some() => self.redirect_last(register),
-            (_, Some(_)) if computed.is_some_and(|last| is_wrapped(last.code, storage)) => self.redirect_last(register),
+            (_, Some(_)) if computed.is_some_and(|last| self.is_stored_form(&last, storage)) => {
+                self.redirect_last(register)
+            }
+            (Pending::Register(a), Some(_)) if storage == Storage::Bool && self.is_bool(a) => {
+                self.value(Operation { code: Code::Move, x: 0, dst: register, a, b: 0 });
+            }
             (value, None) => self.compute(&value, register),
             (value, Some(code)) => {
                 let a = self.in_register(&value, own);
                 self.value(Operation { code, x: 0, dst: register, a, b: 0 });
             }
         }
+    }
+
+    /// Whether an operation's result is as a store to this storage and a load from it would leave it.
+    fn is_stored_form(&self, operation: &Operation, storage: Storage) -> bool {
+        is_wrapped(operation.code, storage) || (storage == Storage::Bool && self.gives_bool(operation))
     }
 
     /// The loads of a storage from where `foreign` says that any NaN may stand.
@@ -146,10 +171,8 @@ impl Translator<'_> {
             Pending::Constant(bits) => self.scalar_load(codes, Base::Image, bits as u32),
             Pending::Element(element) => {
                 self.settle_elements();
-                let code = if element.based { codes.element_based } else { codes.element };
-                let b = self.element_number(element.access);
                 let dst = self.next_register();
-                self.value_from(Operation { code, x: 0, dst, a: element.index, b }, element.origin);
+                self.access_element(codes, true, &element, dst);
                 self.push_result();
             }
         }
@@ -167,11 +190,7 @@ impl Translator<'_> {
             Pending::Constant(bits) => self.effect(Operation { code: codes.image, x: 0, dst, a: bits as u32, b: 0 }),
             Pending::Address(Base::Register(a), b) => self.effect(Operation { code: codes.based, x: 0, dst, a, b }),
             Pending::Register(a) => self.effect(Operation { code: codes.based, x: 0, dst, a, b: 0 }),
-            Pending::Element(element) => {
-                let code = if element.based { codes.element_based } else { codes.element };
-                let b = self.element_number(element.access);
-                self.effect_from(Operation { code, x: 0, dst, a: element.index, b }, element.origin);
-            }
+            Pending::Element(element) => self.access_element(codes, false, &element, dst),
         }
     }
 
@@ -186,7 +205,7 @@ impl Translator<'_> {
             Pending::Register(register) => Pending::Address(Base::Register(register), offset),
             Pending::Constant(bits) => Pending::Constant(bits + u64::from(offset)),
             Pending::Element(mut element) => {
-                element.access.offset += offset;
+                element.offset += offset;
                 Pending::Element(element)
             }
         };
@@ -201,6 +220,7 @@ impl Translator<'_> {
         let reference = self.stack.len() - count - 1;
         let own = self.own_register(reference);
         let image = self.stack[reference].image;
+        let is_loaded_next = matches!(self.next, Some(Instruction::RefLoad { .. }));
         if matches!(self.stack[reference].value, Pending::Element(_)) {
             self.settle_elements();
         }
@@ -219,8 +239,21 @@ impl Translator<'_> {
                 let distance = (bits as i32).wrapping_sub(*lower) as u32;
                 offset = offset.wrapping_add(distance.wrapping_mul(stride));
                 if let Some(element) = &mut pending {
-                    element.access.offset = element.access.offset.wrapping_add(distance.wrapping_mul(stride));
+                    element.offset = element.offset.wrapping_add(distance.wrapping_mul(stride));
                 }
+                continue;
+            }
+            let own_index = self.own_register(reference + 1 + position);
+            let extent = upper.wrapping_sub(*lower) as u32;
+            if let Some(element) = &mut pending
+                && let Pending::Register(index) = index
+                && element.inner.is_none()
+                && element.outer.is_narrow()
+                && stride <= u32::from(u16::MAX)
+                && element.displacement == 0
+                && (is_loaded_next || (index < own && element.outer.index < own))
+            {
+                element.inner = Some(Dimension { index, lower: *lower, extent, stride });
                 continue;
             }
             // An earlier dimension's check comes first, and leaves a reference in the own register.
@@ -229,13 +262,12 @@ impl Translator<'_> {
                 self.compute(&Pending::Element(element), own);
                 (base, offset) = (Base::Register(own), 0);
             }
-            let index = self.in_register(&index, self.own_register(reference + 1 + position));
-            let (based, register) = match base {
-                Base::Image => (false, 0),
-                Base::Register(register) => (true, register),
+            let (index, displacement) = match self.displaced_index(&index, own_index) {
+                Some(found) if position + 1 == count => found,
+                _ => (self.in_register(&index, own_index), 0),
             };
-            let access = ElementAccess { base: register, offset, lower: *lower, upper: *upper, stride };
-            pending = Some(Element { based, access, index, origin: self.origin });
+            let outer = Dimension { index, lower: *lower, extent, stride };
+            pending = Some(Element { base, offset, displacement, outer, inner: None, origin: self.origin });
         }
         self.stack.truncate(reference);
         let value = match pending {
@@ -243,6 +275,20 @@ impl Translator<'_> {
             Some(element) => self.keep_or_compute(element, own),
         };
         self.stack.push(Entry { value, image });
+    }
+
+    /// The index as a register and a small constant, when the operation just before added that: then takes it back.
+    fn displaced_index(&mut self, index: &Pending, own: u32) -> Option<(u32, i16)> {
+        let Pending::Register(register) = *index else { return None };
+        let last = self.last_value(own).filter(|_| register == own)?;
+        let added = match last.code {
+            Code::i32_add => last.b as i32,
+            Code::i32_sub => (last.b as i32).wrapping_neg(),
+            _ => return None,
+        };
+        let displacement = i16::try_from(added).ok()?;
+        self.remove_last();
+        Some((last.a, displacement))
     }
 
     /// Makes the pending index checks of the entries below a depth.
@@ -256,19 +302,26 @@ impl Translator<'_> {
 
     /// Whether an index may stay unchecked until its use: its register must stay as it is although the entries above are gone.
     fn keep_or_compute(&mut self, mut element: Element, own: u32) -> Pending {
+        let base_is_own = element.base == Base::Register(own);
+        if !element.outer.is_narrow() {
+            let depth = self.stack.len();
+            self.settle_below(depth);
+            self.compute(&Pending::Element(element), own);
+            return Pending::Register(own);
+        }
         if matches!(self.next, Some(Instruction::RefLoad { .. })) {
             return Pending::Element(element);
         }
-        let index_is_temporary = element.index > own;
-        let base_is_own = element.based && element.access.base == own;
+        // The indexes of two dimensions are none: that was looked at when they were put together.
+        let index_is_temporary = element.outer.index > own;
         if index_is_temporary && !base_is_own {
             // The entry's own register is free: it keeps the index.
-            if self.last_value(element.index).is_some() {
+            if self.last_value(element.outer.index).is_some() {
                 self.redirect_last(own);
             } else {
-                self.value(Operation { code: Code::Move, x: 0, dst: own, a: element.index, b: 0 });
+                self.value(Operation { code: Code::Move, x: 0, dst: own, a: element.outer.index, b: 0 });
             }
-            element.index = own;
+            element.outer.index = own;
             return Pending::Element(element);
         }
         if index_is_temporary {

@@ -10,6 +10,7 @@
 
 mod control;
 mod emit;
+mod held;
 mod memory;
 mod numeric;
 mod size;
@@ -22,9 +23,10 @@ use khz_bytecode::value::{LocalType, SlotPlace, StackType, Storage};
 use khz_bytecode::verify::{BasicBlock, FunctionFacts, Loop, Verified};
 use khz_machine::image::ImageLayout;
 
-use crate::register_form::{Code, FunctionEntry, Operation, Program};
+use crate::register_form::{Code, FunctionEntry, HeldSlots, Operation, Program};
 use control::Step;
-use emit::Patch;
+use emit::{KnownBools, Patch};
+use held::HeldRegisters;
 use stack::{Entry, Pending};
 
 /// All functions of a verified container in register form; with `fuel`, code that charges fuel.
@@ -34,9 +36,9 @@ pub(crate) fn translate(verified: &Verified, layout: &ImageLayout, fuel: bool) -
     for (index, function) in verified.container().functions.iter().enumerate() {
         // The verifier holds the number of functions to what an id can name.
         let facts = verified.function(FunctionId(index as u16));
-        let registers = FunctionRegisters::new(function, facts);
-        let mut translator = Translator::new(verified, layout, function, facts, registers, &mut program, &mut windows);
+        let mut translator = Translator::new(verified, layout, function, facts, &mut program, &mut windows);
         translator.fuel = fuel;
+        translator.hold_slots();
         translator.function();
     }
     program.register_count = size::register_count(verified, &program, &windows);
@@ -54,6 +56,8 @@ struct FunctionRegisters {
     block_base: u32,
     /// Start of the frame bytes.
     frame_base: u32,
+    /// First slot that is held in a register.
+    held: u32,
     /// Bottom of the operand stack.
     stack: u32,
     /// All registers of the window.
@@ -61,14 +65,20 @@ struct FunctionRegisters {
 }
 
 impl FunctionRegisters {
-    fn new(function: &Function, facts: &FunctionFacts) -> Self {
+    fn new(function: &Function) -> Self {
         let locals = u32::from(matches!(function.owner, Owner::Block(_)));
         let program_base = locals + function.locals.len() as u32;
         let block_base = program_base + u32::from(matches!(function.owner, Owner::Program(_)));
         let frame_base = block_base + u32::from(matches!(function.owner, Owner::Program(_)));
-        let stack = frame_base + u32::from(function.frame.is_some());
+        let held = frame_base + u32::from(function.frame.is_some());
+        FunctionRegisters { locals, program_base, block_base, frame_base, held, stack: held, count: held }
+    }
+
+    /// Puts the operand stack behind the held slots.
+    fn with_stack(self, held_count: u32, function: &Function, facts: &FunctionFacts) -> Self {
+        let stack = self.held + held_count;
         let count = stack + u32::from(facts.max_stack).max(function.results.len() as u32);
-        FunctionRegisters { locals, program_base, block_base, frame_base, stack, count }
+        FunctionRegisters { stack, count, ..self }
     }
 }
 
@@ -88,6 +98,7 @@ struct Translator<'a> {
     function: &'a Function,
     facts: &'a FunctionFacts,
     registers: FunctionRegisters,
+    held: HeldRegisters,
     program: &'a mut Program,
     windows: &'a mut size::CallWindows,
     fuel: bool,
@@ -95,6 +106,10 @@ struct Translator<'a> {
     stack: Vec<Entry>,
     /// Register that the last operation wrote as its only effect, when no jump can come between: it may be redirected.
     last_result: Option<u32>,
+    /// How many data operations stand behind the last operation that is none.
+    data_behind: usize,
+    /// Which operand stack registers hold 0 or 1.
+    bools: KnownBools,
     /// Offset of the instruction that is being translated.
     origin: u32,
     /// The instruction behind it in the same block.
@@ -117,7 +132,6 @@ impl<'a> Translator<'a> {
         layout: &'a ImageLayout,
         function: &'a Function,
         facts: &'a FunctionFacts,
-        registers: FunctionRegisters,
         program: &'a mut Program,
         windows: &'a mut size::CallWindows,
     ) -> Self {
@@ -126,12 +140,15 @@ impl<'a> Translator<'a> {
             layout,
             function,
             facts,
-            registers,
+            registers: FunctionRegisters::new(function),
+            held: HeldRegisters::default(),
             program,
             windows,
             fuel: false,
             stack: Vec::new(),
             last_result: None,
+            data_behind: 0,
+            bools: KnownBools::default(),
             origin: 0,
             next: None,
             block: 0,
@@ -140,6 +157,14 @@ impl<'a> Translator<'a> {
             block_starts: vec![0; facts.blocks.len()],
             patches: Vec::new(),
         }
+    }
+
+    /// Chooses the slots that live in registers, and lays out the window.
+    fn hold_slots(&mut self) {
+        let storage_of = |place, index| self.memory_slot(place, index);
+        let first = self.registers.held;
+        self.held = HeldRegisters::choose(self.verified, self.layout, self.function, self.facts, storage_of, first);
+        self.registers = self.registers.with_stack(self.held.count(), self.function, self.facts);
     }
 
     fn function(&mut self) {
@@ -184,11 +209,24 @@ impl<'a> Translator<'a> {
         if self.function.frame.is_some() {
             self.effect(Operation { code: Code::FrameBase, x: 0, dst: self.registers.frame_base, a: 0, b: 0 });
         }
+        self.bring_slots();
+    }
+
+    fn bring_slots(&mut self) {
+        let first = self.program.slot_runs.len() as u32;
+        self.program.slot_runs.extend_from_slice(&self.held.runs);
+        let end = self.program.slot_runs.len() as u32;
+        let brought_at = self.program.operations.len() as u32;
+        self.program.held.push(HeldSlots { first, end, brought_at });
+        if first != end {
+            self.effect(Operation { code: Code::BringSlots, x: 0, dst: 0, a: first, b: end });
+        }
     }
 
     fn block(&mut self, block: &'a BasicBlock) {
         self.block_starts[self.block] = self.program.operations.len() as u32;
         self.last_result = None;
+        self.bools.forget();
         self.stack.clear();
         for (depth, ty) in block.entry_stack.iter().enumerate() {
             let image = matches!(ty, StackType::Ref(reference) if reference.image);

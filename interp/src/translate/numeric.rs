@@ -39,7 +39,8 @@ pub(super) fn wrap_constant(storage: Storage, bits: u64) -> u64 {
 /// Whether the result of an operation is already as [`wrap_code`] would make it.
 pub(super) fn is_wrapped(code: Code, storage: Storage) -> bool {
     let load = access_codes(storage).load;
-    let by_load = [load.image, load.based, load.element, load.element_based].contains(&code);
+    let by_load =
+        [load.image, load.based, load.element, load.element_based, load.plane, load.plane_based].contains(&code);
     let is_bool = matches!(code, Code::I32Eqz | Code::I32Nez | Code::I64Eqz | Code::I64Nez | Code::LoadBit);
     let by_type = storage == Storage::Bool && (is_bool || branch_codes(code).is_some());
     by_load || by_type || wrap_code(storage) == Some(code)
@@ -93,6 +94,12 @@ impl Translator<'_> {
             first = Some(self.in_register(&entry.value, own));
         }
         let dst = self.next_register();
+        if let Some(a) = first
+            && let Some(operation) = self.with_negation(op, a, &last.value, last_own)
+        {
+            self.value(Operation { dst, ..operation });
+            return self.push_result();
+        }
         let operation = match last.value {
             Pending::Constant(bits) => {
                 let b = self.own_operand(op, bits);
@@ -106,6 +113,31 @@ impl Translator<'_> {
         };
         self.value(operation);
         self.push_result();
+    }
+
+    /// `AND` or `OR` of which the operation just before negates one operand: takes that back and gives the operation for both.
+    fn with_negation(&mut self, op: NumericOp, first: u32, second: &Pending, second_own: u32) -> Option<Operation> {
+        let code = match op {
+            NumericOp::I32And => Code::AndNot,
+            NumericOp::I32Or => Code::OrNot,
+            _ => return None,
+        };
+        let Pending::Register(second) = *second else { return None };
+        let negation = |last: Option<Operation>| last.filter(|last| last.code == Code::I32Eqz).map(|last| last.a);
+        let (a, b) = if second == second_own
+            && let Some(b) = negation(self.last_value(second))
+        {
+            (first, b)
+        } else if first >= self.registers.stack
+            && first != second
+            && let Some(b) = negation(self.last_value(first))
+        {
+            (second, b)
+        } else {
+            return None;
+        };
+        self.remove_last();
+        Some(Operation { code, x: 0, dst: 0, a, b })
     }
 
     /// The last operand of a numeric row as the operation itself carries it.

@@ -4,7 +4,7 @@
 //! register of an entry below it (after `dup`), which then holds just that entry's value and does not change while the entry above lives.
 
 use super::Translator;
-use crate::register_form::{Code, ElementAccess, Operation};
+use crate::register_form::{Code, LoadCodes, Operation};
 
 /// An entry of the operand stack.
 #[derive(Debug, Clone, Copy)]
@@ -40,14 +40,43 @@ pub(super) enum Base {
 /// An array element whose index is not yet checked.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Element {
-    /// Whether `access` counts from its base register.
-    pub based: bool,
-    /// The array.
-    pub access: ElementAccess,
-    /// Register of the index.
-    pub index: u32,
+    /// From where `offset` counts.
+    pub base: Base,
+    /// Offset of the first element's accessed part.
+    pub offset: u32,
+    /// Added to the first index.
+    pub displacement: i16,
+    /// The dimension that is not a constant, or the first of two.
+    pub outer: Dimension,
+    /// The second of two. Both strides then fit 16 bits.
+    pub inner: Option<Dimension>,
     /// Offset of the `ref.index` instruction.
     pub origin: u32,
+}
+
+/// One dimension of an array access.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Dimension {
+    /// Register of the index.
+    pub index: u32,
+    /// Lower bound.
+    pub lower: i32,
+    /// Upper bound - lower bound.
+    pub extent: u32,
+    /// Bytes from one element to the next.
+    pub stride: u32,
+}
+
+impl Dimension {
+    /// Whether the operations for elements can carry it.
+    pub(super) fn is_narrow(&self) -> bool {
+        self.stride <= u32::from(u16::MAX)
+    }
+
+    fn data(&self, dst: u32) -> Operation {
+        // Only asked for narrow ones; the reader takes `x` as unsigned.
+        Operation { code: Code::Data, x: self.stride as u16 as i16, dst, a: self.lower as u32, b: self.extent }
+    }
 }
 
 impl Pending {
@@ -57,7 +86,9 @@ impl Pending {
             Pending::Constant(_) => false,
             Pending::Address(base, _) => *base == Base::Register(register),
             Pending::Element(element) => {
-                element.index == register || (element.based && element.access.base == register)
+                element.outer.index == register
+                    || element.inner.is_some_and(|inner| inner.index == register)
+                    || element.base == Base::Register(register)
             }
         }
     }
@@ -103,27 +134,64 @@ impl Translator<'_> {
                 self.value(Operation { code: Code::Move, x: 0, dst, a, b: 0 });
             }
             Pending::Address(Base::Register(a), b) => self.value(Operation { code: Code::Offset, x: 0, dst, a, b }),
-            Pending::Element(element) => {
-                let code = if element.based { Code::IndexBased } else { Code::Index };
-                let b = self.element_number(element.access);
-                self.value_from(Operation { code, x: 0, dst, a: element.index, b }, element.origin);
-            }
+            Pending::Element(element) => self.compute_element(&element, dst),
+        }
+    }
+
+    /// Checks the index of an element and computes its reference, dimension by dimension.
+    fn compute_element(&mut self, element: &Element, dst: u32) {
+        let Element { base, offset, displacement: x, outer, inner, origin } = *element;
+        if outer.is_narrow() {
+            let (code, b) = match base {
+                Base::Image => (Code::Index, 0),
+                Base::Register(b) => (Code::IndexBased, b),
+            };
+            let operation = Operation { code, x, dst, a: outer.index, b };
+            self.value_from(operation, origin);
+            self.data(&[outer.data(offset)], origin);
+        } else {
+            let b = match base {
+                Base::Image => u32::MAX,
+                Base::Register(b) => b,
+            };
+            let operation = Operation { code: Code::IndexWide, x, dst, a: outer.index, b };
+            let stride = Operation { code: Code::Data, x: 0, dst: 0, a: outer.stride, b: 0 };
+            let data = Dimension { stride: 1, ..outer }.data(offset);
+            self.value_from(operation, origin);
+            self.data(&[data, stride], origin);
+        }
+        if let Some(inner) = inner {
+            let operation = Operation { code: Code::IndexBased, x: 0, dst, a: inner.index, b: dst };
+            self.value_from(operation, origin);
+            self.data(&[inner.data(0)], origin);
+        }
+    }
+
+    /// Appends the load or store of an element; `dst` is the register of the value.
+    pub(super) fn access_element(&mut self, codes: LoadCodes, is_load: bool, element: &Element, dst: u32) {
+        let (plain, based) = match element.inner {
+            None => (codes.element, codes.element_based),
+            Some(_) => (codes.plane, codes.plane_based),
+        };
+        let (code, b) = match element.base {
+            Base::Image => (plain, 0),
+            Base::Register(b) => (based, b),
+        };
+        let operation = Operation { code, x: element.displacement, dst, a: element.outer.index, b };
+        let outer = element.outer.data(element.offset);
+        if is_load {
+            self.value_from(operation, element.origin);
+        } else {
+            self.effect_from(operation, element.origin);
+        }
+        match element.inner {
+            None => self.data(&[outer], element.origin),
+            Some(inner) => self.data(&[outer, inner.data(inner.index)], element.origin),
         }
     }
 
     fn load_constant(&mut self, bits: u64, dst: u32) {
         self.value(Operation { code: Code::Constant, x: 0, dst, a: bits as u32, b: (bits >> 32) as u32 });
-    }
-
-    /// Position of an array access in the program's table.
-    pub(super) fn element_number(&mut self, access: ElementAccess) -> u32 {
-        let elements = &mut self.program.elements;
-        let recent = elements.len().saturating_sub(16);
-        if let Some(at) = elements[recent..].iter().position(|element| *element == access) {
-            return (recent + at) as u32;
-        }
-        elements.push(access);
-        (elements.len() - 1) as u32
     }
 
     /// A register that holds a popped value: where it is, or else `own`.
