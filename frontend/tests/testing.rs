@@ -185,3 +185,13 @@ fn no_text_around_tests_hurts() {
         }
     }
 }
+
+#[test]
+fn a_fixture_does_not_grow_with_the_number_of_tests_without_end() {
+    let setup: String = (0..2000).map(|_| "n := n + 1;\n").collect();
+    let tests: String = (0..MAX_TESTS).map(|number| format!("TEST '{number}' END_TEST\n")).collect();
+    let text = format!("SETUP VAR n : INT; END_VAR\n{setup}END_SETUP\n{tests}");
+    let found = compile_tests(&sources(&text), &CompileOptions::default());
+    assert!(found.tests.is_empty());
+    assert_eq!(found.diagnostics.iter().map(|one| one.code()).collect::<Vec<_>>(), ["P0031"]);
+}

@@ -1,6 +1,7 @@
 //! Configurations: resources, program instances and their connections (IEC 61131-3 6.8).
 
 use std::collections::BTreeMap;
+use std::rc::Rc;
 
 use super::Analyzer;
 use super::expr::{Checker, Environment};
@@ -23,7 +24,7 @@ const DEFAULT_INTERVAL_US: u64 = 10_000;
 /// A resource whose bodies are still to be checked.
 pub(super) struct Planned {
     pub(super) plan: ResourcePlan,
-    pub(super) environment: Environment,
+    pub(super) environment: Rc<Environment>,
 }
 
 impl<'a> Analyzer<'a> {
@@ -134,7 +135,7 @@ impl<'a> Analyzer<'a> {
             bodies: Vec::new(),
             usage: Usage::default(),
         };
-        Some(Planned { plan, environment: self.environment(None, None) })
+        Some(Planned { plan, environment: Rc::new(self.environment(None, None)) })
     }
 
     /// The globals that a resource sees: an inner name hides an outer one.
@@ -209,7 +210,7 @@ impl<'a> Analyzer<'a> {
             let span = declared.name.as_ref().map_or(declared.span, |name| name.span);
             self.report(&rules::NOTHING_RUNS, span, "this resource has no program instance, so nothing runs");
         }
-        Planned { plan, environment }
+        Planned { plan, environment: Rc::new(environment) }
     }
 
     fn instance(

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::Analyzer;
 use super::config::Planned;
 use super::expr::{Checker, Environment};
-use super::tree::{Body, GlobalId, PouId, ResourcePlan, Usage, VarClass};
+use super::tree::{Body, GlobalId, GlobalInfo, PouId, ResourcePlan, Usage, VarClass};
 use super::types::Ty;
 use crate::diagnostics::{Diagnostic, semantic as rules};
 use crate::source::Span;
@@ -137,9 +137,9 @@ impl<'a> Analyzer<'a> {
 
     /// Gives each resource its globals; refuses that two resources use one.
     fn share_globals(&mut self, plans: &mut [ResourcePlan]) {
-        // Tests run one after the other, each with globals of its own.
+        // Tests run one after the other, each with globals of its own: those that it uses, and what may lie below others.
         let anew = self.tests.is_some();
-        let alone = plans.len() <= 1 || anew;
+        let alone = plans.len() <= 1 && !anew;
         let mut users: BTreeMap<GlobalId, usize> = BTreeMap::new();
         let mut clashes = Vec::new();
         for (at, plan) in plans.iter_mut().enumerate() {
@@ -156,7 +156,10 @@ impl<'a> Analyzer<'a> {
             }
             let all = (0u32..).map(GlobalId).zip(&self.globals);
             let used = &plan.usage.used_globals;
-            plan.globals = all.filter(|(id, _)| alone || used.contains_key(id)).map(|(id, _)| id).collect();
+            let belongs = |id: &GlobalId, global: &GlobalInfo| {
+                alone || used.contains_key(id) || (anew && global.located.is_some())
+            };
+            plan.globals = all.filter(|(id, global)| belongs(id, global)).map(|(id, _)| id).collect();
         }
         for (span, name, declared) in clashes {
             let message = format!("two resources use the global `{name}`, and nothing shares it between them");

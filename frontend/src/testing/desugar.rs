@@ -4,7 +4,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::{MAX_TESTS, TestUnit};
+use super::{MAX_FIXTURE_BYTES, MAX_TESTS, TestUnit};
 use crate::diagnostics::{Diagnostic, syntax as rules};
 use crate::source::Span;
 use crate::syntax::ast::{
@@ -56,9 +56,17 @@ pub(crate) fn desugar(ast: &mut Ast) -> (Vec<TestUnit>, Vec<Diagnostic>) {
         file.declarations.extend(globals.into_iter().map(Declaration::Globals));
     }
     let mut units = Vec::new();
+    let mut fixture_bytes = 0;
     for (file, suite) in ast.files.iter_mut().zip(suites) {
         refuse_twins(&suite, &mut found);
         for test in &suite.tests {
+            fixture_bytes += fixture_size(test, &suite);
+            if fixture_bytes > MAX_FIXTURE_BYTES {
+                let message = "SETUP and TEARDOWN come to too much with all the tests before this one";
+                let found_here = Diagnostic::new(&rules::BAD_TEST, test.name_span, message);
+                found.push(found_here.help("move what they do to a FUNCTION_BLOCK"));
+                break;
+            }
             if units.len() >= MAX_TESTS {
                 let message = format!("there are more than {MAX_TESTS} tests; this one and the rest are left out");
                 found.push(
@@ -91,6 +99,12 @@ fn make_instantiable(ast: &mut Ast) {
             _ => {}
         }
     }
+}
+
+/// The bytes of the fixture that a test is compiled with.
+fn fixture_size(test: &Test, suite: &TestSuite) -> u64 {
+    let parts = [&suite.setup, &suite.teardown].into_iter().flatten().filter(|_| test.in_suite);
+    parts.map(|part| u64::from(part.span.len())).sum()
 }
 
 /// Two tests of one name in one file can not be told apart in a report.

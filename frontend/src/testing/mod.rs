@@ -20,8 +20,12 @@ use crate::syntax::symbol::Symbol;
 /// Name of the program instance that runs a test.
 pub const TEST_INSTANCE: &str = "test";
 
-/// How many tests one compilation may have: each is compiled with the SETUP of its file.
+/// How many tests one compilation may have.
 pub const MAX_TESTS: usize = 10_000;
+
+/// How many bytes of SETUP and TEARDOWN one compilation may come to, each counted once for every test that it belongs to: it is
+/// compiled with each.
+pub const MAX_FIXTURE_BYTES: u64 = 8 << 20;
 
 /// Tests, compiled.
 #[derive(Debug)]

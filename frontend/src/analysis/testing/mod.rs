@@ -9,6 +9,7 @@ mod assertions;
 mod mocks;
 
 use std::collections::BTreeMap;
+use std::rc::Rc;
 
 use khz_bytecode::container::{ElementaryType as E, OverrunPolicy};
 
@@ -69,6 +70,7 @@ impl<'a> Analyzer<'a> {
         for (at, global) in (0u32..).zip(&self.globals) {
             environment.entry(global.symbol).or_insert(GlobalId(at));
         }
+        let environment = Rc::new(environment);
         let task = TaskPlan {
             name: TEST_INSTANCE.to_owned(),
             priority: 0,
@@ -101,7 +103,7 @@ impl<'a> Analyzer<'a> {
                 bodies: Vec::new(),
                 usage: Usage::default(),
             };
-            planned.push(Planned { plan, environment: environment.clone() });
+            planned.push(Planned { plan, environment: Rc::clone(&environment) });
         }
         planned
     }
@@ -131,7 +133,7 @@ impl<'a> Analyzer<'a> {
             tests.findings.insert(body.symbol, findings);
         }
         if let Some(slot) = self.pous.get_mut(pou.0 as usize).and_then(Option::as_mut) {
-            std::rc::Rc::make_mut(slot).vars.extend(body.hidden);
+            Rc::make_mut(slot).vars.extend(body.hidden);
         }
     }
 }
