@@ -38,7 +38,8 @@ fn three_tasks_run_as_the_rules_say() {
         35000,10,24,80,91,4,TRUE,2,91
         40000,11,27,90,117,5,FALSE,2,91
         45000,12,30,100,117,5,FALSE,2,91
-    "#]].assert_eq(&interp);
+    "#]]
+    .assert_eq(&interp);
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! What is known of a trap that ended a run.
 
+use khz_machine::engine::Entry;
 use khz_machine::trap::Trap;
 
 use crate::task::TaskIndex;
@@ -19,6 +20,18 @@ pub enum FaultPlace {
         /// Its position in the instance table.
         instance: usize,
     },
+}
+
+impl FaultPlace {
+    /// What the engine was asked to run.
+    #[must_use]
+    pub fn entry(self) -> Entry {
+        match self {
+            FaultPlace::Init => Entry::Init,
+            FaultPlace::Startup => Entry::Startup,
+            FaultPlace::Task { instance, .. } => Entry::Instance(instance),
+        }
+    }
 }
 
 /// A trap, with what ran and when. Names and source lines are the business of who has the debug section.

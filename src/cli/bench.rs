@@ -1,22 +1,18 @@
-//! `khz bench`: the time of a scan, in batches; or start latency per task on the real clock.
+//! `khz bench`: the time of a scan, in batches; or ([`jitter`]) start latency per task on the real clock.
 
 mod html;
+mod jitter;
 mod measure;
 
-use std::time::Duration;
-
 use khz_scheduler::time::DurationNs;
-use khz_scheduler::{
-    Hooks, HostOptions, MonotonicClock, NoInputs, NoIo, NoObserver, RunOptions, RunOutcome, StatisticsReport,
-    StopHandle, on_scan_thread, run as run_rounds, stop_on_signals,
-};
+use khz_scheduler::{HostOptions, MonotonicClock, on_scan_thread};
 use kilohertz::files::{self, Input};
 use kilohertz::pipeline::EngineKind;
 use serde_json::{Value, json};
 
 use super::args::{BenchArgs, EnginesArg, Format};
 use super::output::{Failure, choose, compile_options, load, people, result, write_file};
-use super::report::{FaultContext, report_fault};
+use super::report::report_fault;
 use super::session::{Opened, Session};
 use super::stopwatch::Stopwatch;
 use super::{Outcome, Status};
@@ -46,7 +42,7 @@ pub fn run(args: &BenchArgs) -> Outcome {
     let session = Session::new(program, &args.resource);
     let host = HostOptions::default();
     if args.jitter {
-        let outcome = on_scan_thread(&host, |_| jitter(args, &session));
+        let outcome = on_scan_thread(&host, |_| jitter::run(args, &session));
         return outcome.map_err(|error| Failure::Message(Status::Host, format!("no thread to scan on: {error}")))?;
     }
     let kinds: &[EngineKind] = match args.engine {
@@ -109,8 +105,7 @@ fn bench_engine(
             },
         },
     };
-    let context = FaultContext { container: session.program.container() };
-    report_fault(faulted.report(), &context, args.common.format);
+    report_fault(faulted.report(), session.program.container(), args.common.format);
     Ok(None)
 }
 
@@ -151,66 +146,4 @@ fn figures_json(file: &str, figures: &Figures) -> Value {
         "compile_ns": { "frontend": frontend, "verify": verify, "engine": engine },
         "container_bytes": figures.container_bytes, "code_bytes": figures.code_bytes,
     })
-}
-
-/// Runs on the real clock for `--duration` and reports how late each task started.
-fn jitter(args: &BenchArgs, session: &Session<'_>) -> Outcome {
-    let kind = if args.engine == EnginesArg::Interp { EngineKind::Interp } else { EngineKind::Jit };
-    let stop = StopHandle::new();
-    stop_on_signals(&stop).map_err(|error| Failure::Message(Status::Host, format!("signal handlers: {error}")))?;
-    let clock = Box::new(MonotonicClock::new(DurationNs(0)));
-    let Opened::Ready(resource) = session.open(kind, clock, false, Some(stop.clone()), None)? else {
-        return Err(Failure::Message(Status::Trap, "the initialisation trapped; `khz run` reports where".into()));
-    };
-    let mut rows = session.inputs(resource.image())?;
-    let mut no_rows = NoInputs;
-    let running =
-        resource.start().map_err(|f| Failure::Message(Status::Trap, format!("startup: {}", f.report().trap.code)))?;
-    let duration = Duration::from_secs(args.duration);
-    std::thread::spawn(move || {
-        std::thread::sleep(duration);
-        stop.request();
-    });
-    let (mut io, mut observer) = (NoIo, NoObserver);
-    let mut hooks = Hooks {
-        io: &mut io,
-        inputs: rows.as_mut().map_or(&mut no_rows as _, |rows| rows as _),
-        observer: &mut observer,
-    };
-    let statistics = match run_rounds(running, &mut hooks, RunOptions { scans: args.scans }) {
-        RunOutcome::Completed(resource) | RunOutcome::NothingDue(resource) | RunOutcome::Stopped(resource) => {
-            resource.statistics()
-        }
-        RunOutcome::Faulted(faulted) => {
-            let context = FaultContext { container: session.program.container() };
-            report_fault(faulted.report(), &context, args.common.format);
-            return Ok(Status::Trap);
-        }
-    };
-    print_jitter(args, session, &statistics)
-}
-
-fn print_jitter(args: &BenchArgs, session: &Session<'_>, statistics: &StatisticsReport) -> Outcome {
-    let names = session.program.container().debug.as_ref().map(|debug| debug.task_names.clone()).unwrap_or_default();
-    let text = statistics.to_json(&names);
-    if let Some(path) = &args.json {
-        write_file(path, text.as_bytes())?;
-    }
-    if let Some(path) = &args.report {
-        write_file(path, html::jitter_page(statistics, &names).as_bytes())?;
-    }
-    if args.common.format == Format::Json {
-        result(&text);
-    }
-    for (position, task) in statistics.tasks.iter().enumerate() {
-        let name = names.get(position).cloned().unwrap_or_else(|| format!("task {}", task.id));
-        if let Some(late) = &task.jitter {
-            let [median, p99, p999] = [late.median, late.p99, late.p999].map(Option::unwrap_or_default);
-            people(&format!(
-                "{name}: {} starts, late by {} / {median} / {p99} / {p999} / {} ns (min, median, p99, p99.9, max)",
-                late.count, late.min, late.max
-            ));
-        }
-    }
-    Ok(Status::Done)
 }

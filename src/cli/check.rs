@@ -5,7 +5,7 @@ use kilohertz::files;
 use kilohertz::files::Input;
 
 use super::args::{CheckArgs, Format};
-use super::output::{compile_options, load, people, print_diagnostics};
+use super::output::{compile_options, load, people, print_diagnostics, result};
 use super::{Outcome, Status};
 
 /// Runs it.
@@ -14,9 +14,13 @@ pub fn run(args: &CheckArgs) -> Outcome {
     let Input::Sources(sources) = input else {
         // A container has no source to complain about: checking it is verifying it.
         load(&args.sources)?;
+        if args.common.format == Format::Json {
+            result("[]");
+        }
         return Ok(Status::Done);
     };
-    let checked = khz_frontend::check(&sources, &compile_options(&args.sources));
+    // Limits of the container are found only when it is made.
+    let checked = khz_frontend::compile(&sources, &compile_options(&args.sources));
     print_diagnostics(&checked.diagnostics, &checked.sources, args.common.format);
     if args.common.format == Format::Human {
         let count = |severity| checked.diagnostics.iter().filter(|d| d.severity == severity).count();

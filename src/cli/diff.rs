@@ -150,7 +150,10 @@ fn difference(session: &Session<'_>, pair: [(usize, &Side, &Step); 2]) -> Option
     let (first, second) = (side_name(first), side_name(second));
     if step_a != step_b {
         let describe = |step: &Step| match step.trap {
-            Some(trap) => TrapReport::new(&trap, entry(step.place), session.program.container()).to_string(),
+            Some(trap) => step.place.map_or_else(
+                || trap.code.to_string(),
+                |place| TrapReport::new(&trap, place.entry(), session.program.container()).to_string(),
+            ),
             None => format!("no trap, {} tasks ran", step.round.map_or(0, |round| round.tasks)),
         };
         return Some(format!("{first}: {}\n{second}: {}", describe(step_a), describe(step_b)));
@@ -166,15 +169,6 @@ fn difference(session: &Session<'_>, pair: [(usize, &Side, &Step); 2]) -> Option
         },
         |v| format!("{}: {first} {}, {second} {}", v.name, session.names.text(a, &v), session.names.text(b, &v)),
     ))
-}
-
-fn entry(place: Option<FaultPlace>) -> khz_machine::engine::Entry {
-    use khz_machine::engine::Entry;
-    match place {
-        Some(FaultPlace::Task { instance, .. }) => Entry::Instance(instance),
-        Some(FaultPlace::Init) => Entry::Init,
-        Some(FaultPlace::Startup) | None => Entry::Startup,
-    }
 }
 
 fn report(args: &DiffArgs, rounds: u64, difference: &str) -> Status {

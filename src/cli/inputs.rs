@@ -55,7 +55,10 @@ impl CsvInputs {
         let mut inputs = CsvInputs { names: names.clone(), columns, rows: Vec::new(), next: 0 };
         let mut scratch = image.clone();
         for record in reader.records() {
-            let record = record.map_err(|error| Failure::refused(format!("{}: {error}", path.display())))?;
+            let record = record.map_err(|error| {
+                let line = error.position().map_or(1, csv::Position::line);
+                place(line, &shape_error(error.kind()))
+            })?;
             let line = record.position().map_or(0, csv::Position::line);
             let row = inputs.row(&record, &mut scratch).map_err(|reason| place(line, &reason))?;
             if inputs.rows.last().is_some_and(|last| last.time_us > row.time_us) {
@@ -66,16 +69,29 @@ impl CsvInputs {
         Ok(inputs)
     }
 
+    /// One row; an error begins with the column.
     fn row(&self, record: &csv::StringRecord, scratch: &mut Image) -> Result<Row, String> {
         let time = record.get(0).unwrap_or_default();
         let time_us = time.parse().map_err(|_| format!("`{time}` is no time in microseconds"))?;
         let mut cells = Vec::new();
         for (column, variable) in self.columns.iter().enumerate() {
             let Some(cell) = record.get(column + 1).filter(|cell| !cell.is_empty()) else { continue };
-            self.names.write(scratch, variable, cell).map_err(|error| error.to_string())?;
+            let wrong = |error| format!("column {}: {error}", column + 2);
+            self.names.write(scratch, variable, cell).map_err(wrong)?;
             cells.push((column, cell.to_string()));
         }
         Ok(Row { time_us, cells })
+    }
+}
+
+/// What is wrong with the shape of a row.
+fn shape_error(kind: &csv::ErrorKind) -> String {
+    match kind {
+        csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {
+            format!("{len} cells, but the header has {expected_len}")
+        }
+        csv::ErrorKind::Utf8 { .. } => "the text is not UTF-8".to_string(),
+        other => format!("{other:?}"),
     }
 }
 

@@ -12,8 +12,8 @@ use khz_scheduler::{
 use kilohertz::pipeline::EngineKind;
 
 use super::args::{ClockArg, EngineArg, Format, RunArgs};
-use super::output::{Failure, choose, load, people, print_diagnostics, write_file};
-use super::report::{FaultContext, report_fault};
+use super::output::{Failure, choose, load, people, print_diagnostics, result, write_file};
+use super::report::report_fault;
 use super::session::{Opened, Session};
 use super::trace::Onlooker;
 use super::{Outcome, Status};
@@ -79,17 +79,19 @@ fn end(args: &RunArgs, session: &Session<'_>, outcome: RunOutcome) -> Outcome {
         RunOutcome::Faulted(faulted) => return end_faulted(args, session, &faulted),
     };
     write_results(args, session, resource.image(), &resource.statistics())?;
-    if args.common.format == Format::Human {
+    let statistics = resource.statistics();
+    if args.common.format == Format::Json {
+        result(&format!("{{\"ended\":\"{why}\",\"statistics\":{}}}", statistics_json(session, &statistics)));
+    } else {
         people(&format!("{why} after {} rounds, {:.3} s", resource.rounds(), resource.time().as_us() as f64 / 1e6));
-        summary(&resource.statistics(), session);
+        summary(&statistics, session);
     }
     Ok(Status::Done)
 }
 
 fn end_faulted(args: &RunArgs, session: &Session<'_>, faulted: &Resource<Faulted>) -> Outcome {
     write_results(args, session, faulted.image(), &faulted.statistics())?;
-    let context = FaultContext { container: session.program.container() };
-    report_fault(faulted.report(), &context, args.common.format);
+    report_fault(faulted.report(), session.program.container(), args.common.format);
     Ok(Status::Trap)
 }
 
@@ -109,11 +111,13 @@ fn write_results(
         write_file(path, text.as_bytes())?;
     }
     if let Some(path) = &args.stats {
-        let names =
-            session.program.container().debug.as_ref().map(|debug| debug.task_names.clone()).unwrap_or_default();
-        write_file(path, statistics.to_json(&names).as_bytes())?;
+        write_file(path, statistics_json(session, statistics).as_bytes())?;
     }
     Ok(())
+}
+
+fn statistics_json(session: &Session<'_>, statistics: &StatisticsReport) -> String {
+    statistics.to_json(&session.program.task_names())
 }
 
 fn is_json(path: &Path) -> bool {
@@ -122,11 +126,7 @@ fn is_json(path: &Path) -> bool {
 
 /// One line a task: what it did and what it took.
 fn summary(statistics: &StatisticsReport, session: &Session<'_>) {
-    let debug = session.program.container().debug.as_ref();
-    for (position, task) in statistics.tasks.iter().enumerate() {
-        let name = debug
-            .and_then(|debug| debug.task_names.get(position))
-            .map_or_else(|| format!("task {}", task.id), Clone::clone);
+    for (name, task) in session.program.task_names().iter().zip(&statistics.tasks) {
         let mut line =
             format!("  {name}: {} scans, {} overruns, {} cycles lost", task.scans, task.overruns, task.lost_cycles);
         if let Some(execution) = &task.execution {

@@ -52,7 +52,39 @@ pub fn jitter_page(statistics: &StatisticsReport, names: &[String]) -> String {
             late.count, late.min, late.max, task.overruns
         );
     }
-    out + "</table></body></html>"
+    out.push_str("</table>");
+    for (position, task) in statistics.tasks.iter().enumerate() {
+        let Some(late) = &task.jitter else { continue };
+        let name = names.get(position).map_or_else(|| format!("task {}", task.id), |name| escaped(name));
+        let _ = write!(out, "<h2>{name}</h2>");
+        bars(
+            &mut out,
+            &[
+                ("min", late.min),
+                ("median", late.median.unwrap_or_default()),
+                ("p99", late.p99.unwrap_or_default()),
+                ("p99.9", late.p999.unwrap_or_default()),
+                ("max", late.max),
+            ],
+        );
+    }
+    out + "</body></html>"
+}
+
+/// One horizontal bar a figure, all to the scale of the largest.
+fn bars(out: &mut String, figures: &[(&str, u64)]) {
+    let most = figures.iter().map(|figure| figure.1).max().unwrap_or(1).max(1);
+    let _ = write!(out, "<svg width=\"{WIDTH}\" height=\"{}\" role=\"img\">", figures.len() * 24);
+    for (at, (name, ns)) in figures.iter().enumerate() {
+        let width = u128::from(*ns) * (WIDTH as u128 - 200) / u128::from(most);
+        let (top, middle) = (at * 24 + 4, at * 24 + 16);
+        let _ = write!(
+            out,
+            "<text x=\"4\" y=\"{middle}\">{name}</text><rect x=\"60\" y=\"{top}\" width=\"{width}\" height=\"16\"/><text x=\"{}\" y=\"{middle}\">{ns} ns</text>",
+            66 + width
+        );
+    }
+    out.push_str("</svg>");
 }
 
 fn head(title: &str, heading: &str) -> String {
