@@ -247,6 +247,11 @@ impl Checker<'_, '_> {
             }
             ExprKind::Const(Const::Wide(value @ (0 | 1))) if to == E::Bool => Const::Int(i64::from(*value == 1)),
             ExprKind::Const(Const::Lit(wide, narrow)) if is_real(to) => {
+                if wide.is_finite() && to == E::Real && narrow.is_infinite() {
+                    let message = format!("{wide:E} does not fit REAL, which holds up to {:E}", f32::MAX);
+                    self.an.report(&rules::LITERAL_RANGE, span, message);
+                    return fail;
+                }
                 if to == E::Real {
                     Const::F32(fold::canonical32(*narrow))
                 } else {

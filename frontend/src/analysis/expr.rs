@@ -307,7 +307,11 @@ impl<'c, 'a> Checker<'c, 'a> {
     }
 
     fn unary(&mut self, op: ast::UnaryOp, operand: &'a ast::Expr, span: Span, want: Ty) -> Expr {
-        let found = self.expr(operand, want);
+        let mut found = self.expr(operand, want);
+        if let (ast::UnaryOp::Not, Ty::IntLit, Some(ty)) = (op, found.ty, self.an.types.elementary(want)) {
+            // How many bits NOT turns over, the place says.
+            found = self.literal(&found, ty);
+        }
         if found.ty == Ty::Error {
             return broken(span);
         }

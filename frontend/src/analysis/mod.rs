@@ -228,7 +228,8 @@ impl<'a> Analyzer<'a> {
         // A name that is known elsewhere but not here is no mistake of spelling.
         for symbol in known.filter(|symbol| *symbol != ident.symbol) {
             let name = self.text(symbol);
-            let limit = (wanted.len() / 3).clamp(1, 3);
+            // Every short name is near to every other one.
+            let limit = (wanted.len() / 3).min(3);
             if let Some(distance) = edit_distance(wanted, name, limit)
                 && best.is_none_or(|found| (distance, name) < (found.0, found.1))
             {

@@ -230,6 +230,10 @@ impl<'b, 'p> FunctionBuilder<'b, 'p> {
         let exit = self.e.label();
         let header = self.e.bind_header();
         self.e.mark(condition.span);
+        if matches!(condition.kind, ExprKind::Const(_)) {
+            // A condition without code: a deadline that ends the loop shall name its WHILE, not its body.
+            self.e.push(I::Nop {}, 0, 0);
+        }
         self.jump_when(condition, exit, false);
         self.loops.push((next, exit));
         self.statements(body);
