@@ -51,6 +51,13 @@ fn register_bits(kind: IntegerType, carrier: i64) -> u64 {
     }
 }
 
+/// `for.enter` with operands that are known: the control variable's register and whether a first pass is due, or nothing for a
+/// step of 0.
+pub(crate) fn known_start(kind: IntegerType, initial: u64, bound: u64, step: u64) -> Option<(u64, bool)> {
+    let bits = register_bits(kind, semantics::wrap_integer(kind, initial as i64));
+    (step != 0).then(|| (bits, semantics::for_is_due(kind, bits as i64, bound as i64, step as i64)))
+}
+
 /// `for.enter` with initial value, bound and step in the registers from `operands` on: whether a first pass is due, or nothing for a
 /// step of 0.
 pub(crate) fn enter_loop(

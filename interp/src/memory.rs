@@ -233,6 +233,9 @@ lanes! {
 
 /// A scalar as it lies in memory.
 pub(crate) trait Scalar: Sized {
+    /// Whether it has more than the 32 bits of an operand.
+    const IS_WIDE: bool = size_of::<Self>() > size_of::<u32>();
+
     /// The bits of a register after a load.
     fn load(bytes: &[u8], at: usize) -> u64;
     /// Stores from the bits of a register.

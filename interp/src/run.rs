@@ -118,7 +118,7 @@ macro_rules! define_run {
         [$(($opcode:literal, $variant:ident, $function:ident, $mnemonic:literal, [$($operand:ident)*] -> $result:ident, $traps:ident, $cost:literal, $doc:literal)),*]
         [$(($storage:ident, $ty:ty, $load:ident, $load_based:ident, $load_element:ident, $load_element_based:ident,
             $load_plane:ident, $load_plane_based:ident, $store:ident, $store_based:ident, $store_element:ident,
-            $store_element_based:ident, $store_plane:ident, $store_plane_based:ident)),*]
+            $store_element_based:ident, $store_plane:ident, $store_plane_based:ident, $store_const:ident, $store_based_const:ident)),*]
         [$(($float:ident, $float_ty:ty, $canonical:ident, $foreign:ident, $foreign_based:ident, $foreign_element:ident, $foreign_element_based:ident,
             $foreign_plane:ident, $foreign_plane_based:ident)),*]
         [$(($compare:ident, $compare_function:ident, [$($compare_operand:ident)*], $if_:ident, $unless:ident, $if_const:ident, $unless_const:ident)),*]
@@ -258,6 +258,14 @@ macro_rules! define_run {
                         Code::$store_plane_based => {
                             <$ty as Scalar>::store(memory, plane_element!(op, reference!(op.b)), registers.get(op.dst));
                         }
+                        Code::$store_const => {
+                            let bits = if <$ty as Scalar>::IS_WIDE { program.constants[op.dst as usize] } else { u64::from(op.dst) };
+                            <$ty as Scalar>::store(memory, op.a as usize, bits);
+                        }
+                        Code::$store_based_const => {
+                            let bits = if <$ty as Scalar>::IS_WIDE { program.constants[op.dst as usize] } else { u64::from(op.dst) };
+                            <$ty as Scalar>::store(memory, based!(op.a, op.b), bits);
+                        }
                         Code::$store => <$ty as Scalar>::store(memory, op.a as usize, registers.get(op.dst)),
                         Code::$store_based => <$ty as Scalar>::store(memory, based!(op.a, op.b), registers.get(op.dst)),
                         Code::$store_element => <$ty as Scalar>::store(memory, element!(op, 0), registers.get(op.dst)),
@@ -375,6 +383,16 @@ macro_rules! define_run {
                     Code::JumpUnless => jump_if!(registers.get(op.a) as u32 == 0, op),
                     Code::JumpIfMasked => jump_if!(registers.get(op.a) as u32 & op.b != 0, op),
                     Code::JumpUnlessMasked => jump_if!(registers.get(op.a) as u32 & op.b == 0, op),
+                    Code::F32MulAdd => {
+                        let product = semantics::f32_mul(Lane::from_bits(registers.get(op.a)), Lane::from_bits(registers.get(op.b)));
+                        let sum = semantics::f32_add(Lane::from_bits(registers.get(op.x as u32)), product);
+                        registers.set(op.dst, sum.into_bits());
+                    }
+                    Code::F64MulAdd => {
+                        let product = semantics::f64_mul(Lane::from_bits(registers.get(op.a)), Lane::from_bits(registers.get(op.b)));
+                        let sum = semantics::f64_add(Lane::from_bits(registers.get(op.x as u32)), product);
+                        registers.set(op.dst, sum.into_bits());
+                    }
                     Code::AndNot => {
                         let (first, second) = (registers.get(op.a) as u32, registers.get(op.b) as u32);
                         registers.set(op.dst, u64::from(first & u32::from(second == 0)));

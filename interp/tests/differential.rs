@@ -6,7 +6,7 @@ mod common;
 use std::fmt::Write;
 
 use common::load;
-use khz_bytecode::container::{Constant, ControlPlace, Owner, Type};
+use khz_bytecode::container::{Constant, ControlPlace, ForLoop, Type};
 use khz_bytecode::ids::{FunctionId, SlotIndex};
 use khz_bytecode::instruction::{Instruction, NumericOp};
 use khz_bytecode::value::{BytePlace, LocalType, SlotPlace, Storage, ValueType};
@@ -23,6 +23,14 @@ struct Plain<'a> {
 }
 
 type Stop = (TrapCode, [i64; 3]);
+
+/// The `L` slot of a control variable: these programs have no others.
+fn local_control(descriptor: &ForLoop) -> SlotIndex {
+    match descriptor.control {
+        ControlPlace::Slot(SlotPlace::Local, control) => control,
+        other => panic!("{other:?}"),
+    }
+}
 
 impl Plain<'_> {
     fn pop(&mut self) -> u64 {
@@ -71,7 +79,6 @@ impl Plain<'_> {
         let verified = self.verified;
         let function = &verified.container().functions[id.index()];
         let facts = verified.function(id);
-        assert!(!matches!(function.owner, Owner::Block(_)));
         let mut locals = vec![0_u64; function.locals.len()];
         let mut scratch = [0_u8; 8];
         let mut set = |locals: &mut Vec<u64>, index: usize, bits: u64| {
@@ -107,7 +114,7 @@ impl Plain<'_> {
                 }
                 Instruction::ForEnter { id, exit } => {
                     let descriptor = function.for_loops[id.index()];
-                    let ControlPlace::Slot(SlotPlace::Local, control) = descriptor.control else { panic!() };
+                    let control = local_control(&descriptor);
                     let (step, bound, initial) = (self.pop(), self.pop(), self.pop());
                     locals[descriptor.step.index()] = step;
                     locals[descriptor.bound.index()] = bound;
@@ -119,7 +126,7 @@ impl Plain<'_> {
                 }
                 Instruction::ForNext { id, header } => {
                     let descriptor = function.for_loops[id.index()];
-                    let ControlPlace::Slot(SlotPlace::Local, control) = descriptor.control else { panic!() };
+                    let control = local_control(&descriptor);
                     let value = |slot: SlotIndex| locals[slot.index()] as i64;
                     let (bound, step) = (value(descriptor.bound), value(descriptor.step));
                     let (next, goes_on) = semantics::for_next(descriptor.ty, value(control), bound, step);

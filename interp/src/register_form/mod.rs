@@ -37,7 +37,7 @@ macro_rules! define_code {
         [$(($opcode:literal, $variant:ident, $function:ident, $mnemonic:literal, [$($operand:ident)*] -> $result:ident, $traps:ident, $cost:literal, $doc:literal)),*]
         [$(($storage:ident, $ty:ty, $load:ident, $load_based:ident, $load_element:ident, $load_element_based:ident,
             $load_plane:ident, $load_plane_based:ident, $store:ident, $store_based:ident, $store_element:ident,
-            $store_element_based:ident, $store_plane:ident, $store_plane_based:ident)),*]
+            $store_element_based:ident, $store_plane:ident, $store_plane_based:ident, $store_const:ident, $store_based_const:ident)),*]
         [$(($float:ident, $float_ty:ty, $canonical:ident, $foreign:ident, $foreign_based:ident, $foreign_element:ident, $foreign_element_based:ident,
             $foreign_plane:ident, $foreign_plane_based:ident)),*]
         [$(($compare:ident, $compare_function:ident, [$($compare_operand:ident)*], $if_:ident, $unless:ident, $if_const:ident, $unless_const:ident)),*]
@@ -50,7 +50,7 @@ macro_rules! define_code {
         pub(crate) enum Code {
             $($variant, $function,)*
             $($load, $load_based, $load_element, $load_element_based, $load_plane, $load_plane_based,
-            $store, $store_based, $store_element, $store_element_based, $store_plane, $store_plane_based,)*
+            $store, $store_based, $store_element, $store_element_based, $store_plane, $store_plane_based, $store_const, $store_based_const,)*
             $($foreign, $foreign_based, $foreign_element, $foreign_element_based, $foreign_plane, $foreign_plane_based,)*
             $($if_, $unless, $if_const, $unless_const,)*
             /// Start of a function: deadline; zeroes `a` registers from `dst` on and `b` frame bytes.
@@ -83,6 +83,10 @@ macro_rules! define_code {
             /// bound, `x` bytes from one element to the next (unsigned); `dst` for the first dimension the offset of the first element's
             /// accessed part, for the second one the register of the index.
             Data,
+            /// `dst` := register `x` + `a` * `b`, with two roundings.
+            F32MulAdd,
+            /// As `F32MulAdd`.
+            F64MulAdd,
             /// `dst` := `a` and (`b` = 0).
             AndNot,
             /// `dst` := `a` or (`b` = 0).
@@ -165,6 +169,11 @@ macro_rules! define_code {
                     plane: Code::$store_plane, plane_based: Code::$store_plane_based,
                 },
             },)* }
+        }
+
+        /// The stores of a constant: to an image offset, from a register. `dst` is the value, or for 64 bits its number in the constants.
+        pub(crate) fn constant_store_codes(storage: Storage) -> (Code, Code) {
+            match storage { $(Storage::$storage => (Code::$store_const, Code::$store_based_const),)* }
         }
 
         /// The loads of a storage from where any NaN may stand.

@@ -18,23 +18,23 @@ macro_rules! for_each_operation {
             [$($numeric),*]
             [
                 (Bool, bool, LoadBool, LoadBasedBool, LoadElementBool, LoadElementBasedBool,
-                 LoadPlaneBool, LoadPlaneBasedBool, StoreBool, StoreBasedBool, StoreElementBool, StoreElementBasedBool, StorePlaneBool, StorePlaneBasedBool),
+                 LoadPlaneBool, LoadPlaneBasedBool, StoreBool, StoreBasedBool, StoreElementBool, StoreElementBasedBool, StorePlaneBool, StorePlaneBasedBool, StoreConstBool, StoreBasedConstBool),
                 (I8, i8, LoadI8, LoadBasedI8, LoadElementI8, LoadElementBasedI8,
-                 LoadPlaneI8, LoadPlaneBasedI8, StoreI8, StoreBasedI8, StoreElementI8, StoreElementBasedI8, StorePlaneI8, StorePlaneBasedI8),
+                 LoadPlaneI8, LoadPlaneBasedI8, StoreI8, StoreBasedI8, StoreElementI8, StoreElementBasedI8, StorePlaneI8, StorePlaneBasedI8, StoreConstI8, StoreBasedConstI8),
                 (U8, u8, LoadU8, LoadBasedU8, LoadElementU8, LoadElementBasedU8,
-                 LoadPlaneU8, LoadPlaneBasedU8, StoreU8, StoreBasedU8, StoreElementU8, StoreElementBasedU8, StorePlaneU8, StorePlaneBasedU8),
+                 LoadPlaneU8, LoadPlaneBasedU8, StoreU8, StoreBasedU8, StoreElementU8, StoreElementBasedU8, StorePlaneU8, StorePlaneBasedU8, StoreConstU8, StoreBasedConstU8),
                 (I16, i16, LoadI16, LoadBasedI16, LoadElementI16, LoadElementBasedI16,
-                 LoadPlaneI16, LoadPlaneBasedI16, StoreI16, StoreBasedI16, StoreElementI16, StoreElementBasedI16, StorePlaneI16, StorePlaneBasedI16),
+                 LoadPlaneI16, LoadPlaneBasedI16, StoreI16, StoreBasedI16, StoreElementI16, StoreElementBasedI16, StorePlaneI16, StorePlaneBasedI16, StoreConstI16, StoreBasedConstI16),
                 (U16, u16, LoadU16, LoadBasedU16, LoadElementU16, LoadElementBasedU16,
-                 LoadPlaneU16, LoadPlaneBasedU16, StoreU16, StoreBasedU16, StoreElementU16, StoreElementBasedU16, StorePlaneU16, StorePlaneBasedU16),
+                 LoadPlaneU16, LoadPlaneBasedU16, StoreU16, StoreBasedU16, StoreElementU16, StoreElementBasedU16, StorePlaneU16, StorePlaneBasedU16, StoreConstU16, StoreBasedConstU16),
                 (I32, i32, LoadI32, LoadBasedI32, LoadElementI32, LoadElementBasedI32,
-                 LoadPlaneI32, LoadPlaneBasedI32, StoreI32, StoreBasedI32, StoreElementI32, StoreElementBasedI32, StorePlaneI32, StorePlaneBasedI32),
+                 LoadPlaneI32, LoadPlaneBasedI32, StoreI32, StoreBasedI32, StoreElementI32, StoreElementBasedI32, StorePlaneI32, StorePlaneBasedI32, StoreConstI32, StoreBasedConstI32),
                 (I64, i64, LoadI64, LoadBasedI64, LoadElementI64, LoadElementBasedI64,
-                 LoadPlaneI64, LoadPlaneBasedI64, StoreI64, StoreBasedI64, StoreElementI64, StoreElementBasedI64, StorePlaneI64, StorePlaneBasedI64),
+                 LoadPlaneI64, LoadPlaneBasedI64, StoreI64, StoreBasedI64, StoreElementI64, StoreElementBasedI64, StorePlaneI64, StorePlaneBasedI64, StoreConstI64, StoreBasedConstI64),
                 (F32, f32, LoadF32, LoadBasedF32, LoadElementF32, LoadElementBasedF32,
-                 LoadPlaneF32, LoadPlaneBasedF32, StoreF32, StoreBasedF32, StoreElementF32, StoreElementBasedF32, StorePlaneF32, StorePlaneBasedF32),
+                 LoadPlaneF32, LoadPlaneBasedF32, StoreF32, StoreBasedF32, StoreElementF32, StoreElementBasedF32, StorePlaneF32, StorePlaneBasedF32, StoreConstF32, StoreBasedConstF32),
                 (F64, f64, LoadF64, LoadBasedF64, LoadElementF64, LoadElementBasedF64,
-                 LoadPlaneF64, LoadPlaneBasedF64, StoreF64, StoreBasedF64, StoreElementF64, StoreElementBasedF64, StorePlaneF64, StorePlaneBasedF64)
+                 LoadPlaneF64, LoadPlaneBasedF64, StoreF64, StoreBasedF64, StoreElementF64, StoreElementBasedF64, StorePlaneF64, StorePlaneBasedF64, StoreConstF64, StoreBasedConstF64)
             ]
             [
                 (F32, f32, canonical_f32, LoadForeignF32, LoadForeignBasedF32, LoadForeignElementF32, LoadForeignElementBasedF32,

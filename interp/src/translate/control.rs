@@ -8,6 +8,7 @@ use khz_bytecode::verify::FunctionFacts;
 
 use super::Translator;
 use super::stack::{Base, Pending};
+use crate::loops::known_start;
 use crate::register_form::{Code, Control, ForAccess, Operation, branch_codes};
 
 /// What the translation knows of a FOR loop's step.
@@ -157,14 +158,46 @@ impl Translator<'_> {
             let step = step.filter(|step| *step != 0).and_then(|step| i16::try_from(step).ok());
             self.steps[id.index()] = step.map_or(Step::Unknown, Step::Constant);
         }
+        let access = self.for_access(id);
+        if self.for_enter_known(id, access, exit) {
+            return;
+        }
         self.settle_all();
         self.stack.truncate(depth - 3);
         let b = self.next_register();
-        let access = self.for_access(id);
         let a = self.program.for_loops.len() as u32;
         self.program.for_loops.push(access);
         let block = self.block_at(exit);
         self.branch_to(Operation { code: Code::ForEnter, x: 0, dst: 0, a, b }, block, 0);
+    }
+
+    /// `for.enter` with constant operands and a control variable in a register: constants, and a jump when no pass is due.
+    fn for_enter_known(&mut self, id: ForId, access: ForAccess, exit: Label) -> bool {
+        let Control::Register(control) = access.control else { return false };
+        let [.., initial, bound, step] = self.stack.as_slice() else { return false };
+        let (Pending::Constant(initial), Pending::Constant(bound), Pending::Constant(step)) =
+            (initial.value, bound.value, step.value)
+        else {
+            return false;
+        };
+        let Some((start, is_due)) = known_start(access.kind, initial, bound, step) else { return false };
+        self.stack.truncate(self.stack.len() - 3);
+        self.settle_all();
+        self.compute(&Pending::Constant(bound), access.bound);
+        // Fast ends of passes carry the step; the loop's only one then is of that form.
+        let header = self.header_loops.get(self.block + 1).copied().flatten();
+        let is_carried = header.is_some_and(|l| l.for_loop == Some(id))
+            && matches!(self.steps[id.index()], Step::Constant(_))
+            && matches!(access.kind, IntegerType::I32 | IntegerType::I16);
+        if !is_carried {
+            self.compute(&Pending::Constant(step), access.step);
+        }
+        self.compute(&Pending::Constant(start), control);
+        if !is_due {
+            let block = self.block_at(exit);
+            self.jump_to(block);
+        }
+        true
     }
 
     fn is_program_base(&self, register: u32) -> bool {

@@ -2,7 +2,9 @@
 
 use khz_bytecode::ids::Label;
 
+use khz_bytecode::instruction::Instruction;
 use khz_bytecode::value::{LocalType, Storage};
+use khz_bytecode::verify::BasicBlock;
 
 use super::Translator;
 use super::numeric::is_wrapped;
@@ -197,21 +199,69 @@ impl Translator<'_> {
         if block == self.block + 1 {
             return;
         }
+        if self.end_pass_instead(block) {
+            return;
+        }
         // A jump back goes to a loop header: it does the header's check itself.
         let back = block <= self.block && self.header_loops[block].is_some();
         let code = if back { Code::Repeat } else { Code::Jump };
         self.branch_to(Operation { code, x: 0, dst: 0, a: 0, b: 0 }, block, u32::from(back));
     }
 
+    /// A jump to a block that does nothing but end a pass of a FOR loop: ends it here.
+    fn end_pass_instead(&mut self, block: usize) -> bool {
+        let Some(BasicBlock { start, end, .. }) = self.facts.blocks.get(block) else { return false };
+        let Some([only]) = self.facts.instructions.get(*start..*end) else { return false };
+        let Instruction::ForNext { id, header } = only.instruction else { return false };
+        if self.header_loops[block].is_some() || block <= self.block {
+            return false;
+        }
+        let own = std::mem::replace(&mut self.origin, only.offset);
+        self.for_next(id, header);
+        self.origin = own;
+        let at = PatchPlace::Operation(self.program.operations.len());
+        self.patches.push(Patch { at, block: block + 1, skip: 0 });
+        self.effect(Operation { code: Code::Jump, x: 0, dst: 0, a: 0, b: 0 });
+        true
+    }
+
+    /// Lets jumps go straight to where they end up. The ends of passes stay: their target names the header whose limits they check.
+    fn shorten_jumps(&mut self, patches: &[Patch]) {
+        const MOST_HOPS: usize = 8;
+        for patch in patches {
+            let PatchPlace::Operation(at) = patch.at else { continue };
+            let operation = self.program.operations[at];
+            if patch.skip != 0 || matches!(operation.code, Code::Repeat | Code::ForNext) {
+                continue;
+            }
+            let mut target = operation.dst;
+            for _ in 0..MOST_HOPS {
+                match self.program.operations[target as usize] {
+                    Operation { code: Code::Jump, dst, .. } => target = dst,
+                    _ => break,
+                }
+            }
+            let end = self.program.operations[target as usize];
+            if operation.code == Code::Jump && matches!(end.code, Code::Repeat | Code::Return | Code::ReturnOne) {
+                self.program.operations[at] = end;
+                self.program.origins[at] = self.program.origins[target as usize];
+            } else {
+                self.program.operations[at].dst = target;
+            }
+        }
+    }
+
     /// Fills in all jump targets of the function.
     pub(super) fn apply_patches(&mut self) {
-        for patch in std::mem::take(&mut self.patches) {
+        let patches = std::mem::take(&mut self.patches);
+        for patch in &patches {
             let target = self.block_starts[patch.block] + patch.skip;
             match patch.at {
                 PatchPlace::Operation(at) => self.program.operations[at].dst = target,
                 PatchPlace::Table(at) => self.program.jump_table[at] = target,
             }
         }
+        self.shorten_jumps(&patches);
     }
 
     /// Notes that jump table entry `at` goes to a block.

@@ -4,12 +4,12 @@ use khz_bytecode::container::{ArrayDescriptor, Type};
 use khz_bytecode::ids::{ArrayId, SlotIndex, TypeId};
 use khz_bytecode::instruction::Instruction;
 use khz_bytecode::limits::SLOT_BYTES;
-use khz_bytecode::value::{BytePlace, LocalType, SlotPlace, Storage};
+use khz_bytecode::value::{BytePlace, LocalType, SlotPlace, Storage, ValueType};
 
 use super::Translator;
 use super::numeric::{is_wrapped, wrap_code, wrap_constant};
 use super::stack::{Base, Dimension, Element, Entry, Pending};
-use crate::register_form::{Code, LoadCodes, Operation, access_codes, foreign_load_codes};
+use crate::register_form::{Code, LoadCodes, Operation, access_codes, constant_store_codes, foreign_load_codes};
 
 impl Translator<'_> {
     /// Where a byte place starts.
@@ -52,6 +52,15 @@ impl Translator<'_> {
     fn scalar_store(&mut self, storage: Storage, base: Base, offset: u32) {
         self.settle_elements();
         let (entry, own) = self.pop();
+        if let Pending::Constant(bits) = entry.value {
+            let is_wide = matches!(storage.value_type(), ValueType::I64 | ValueType::F64);
+            let dst = if is_wide { self.constant_number(bits) } else { bits as u32 };
+            let (image, based) = constant_store_codes(storage);
+            return self.effect(match base {
+                Base::Image => Operation { code: image, x: 0, dst, a: offset, b: 0 },
+                Base::Register(a) => Operation { code: based, x: 0, dst, a, b: offset },
+            });
+        }
         let dst = self.in_register(&entry.value, own);
         let codes = access_codes(storage).store;
         self.effect(match base {
@@ -169,8 +178,18 @@ impl Translator<'_> {
             Pending::Register(register) => self.scalar_load(codes, Base::Register(register), 0),
             // References are never constants; their bits would be an image offset.
             Pending::Constant(bits) => self.scalar_load(codes, Base::Image, bits as u32),
-            Pending::Element(element) => {
-                self.settle_elements();
+            Pending::Element(mut element) => {
+                // A pending check that asks the same is made by this load, in the name of the one that was asked for first.
+                let mut pending = self.stack.iter().filter_map(|entry| match entry.value {
+                    Pending::Element(other) => Some(other),
+                    _ => None,
+                });
+                match pending.next() {
+                    Some(first) if first.checks_as(&element) && pending.all(|other| other.checks_as(&element)) => {
+                        element.origin = first.origin;
+                    }
+                    _ => self.settle_elements(),
+                }
                 let dst = self.next_register();
                 self.access_element(codes, true, &element, dst);
                 self.push_result();

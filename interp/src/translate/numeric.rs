@@ -86,16 +86,19 @@ impl Translator<'_> {
         }
         let (mut last, mut last_own) = self.pop();
         let mut first = None;
+        let mut first_own = 0;
         if op.operands().len() == 2 {
             let (mut entry, mut own) = self.pop();
             if is_commutative(op) && matches!(entry.value, Pending::Constant(_)) {
                 (entry, last, own, last_own) = (last, entry, last_own, own);
             }
             first = Some(self.in_register(&entry.value, own));
+            first_own = own;
         }
         let dst = self.next_register();
         if let Some(a) = first
-            && let Some(operation) = self.with_negation(op, a, &last.value, last_own)
+            && let Some(operation) = (self.with_negation(op, (a, first_own), &last.value, last_own))
+                .or_else(|| self.with_product(op, (a, first_own), &last.value, last_own))
         {
             self.value(Operation { dst, ..operation });
             return self.push_result();
@@ -115,8 +118,47 @@ impl Translator<'_> {
         self.push_result();
     }
 
+    /// A sum of which the operation just before computes one operand as a product: takes that back and gives the operation for both.
+    /// Which operand it is does not matter: a sum of floats does not depend on their order, as there is one NaN.
+    fn with_product(
+        &mut self,
+        op: NumericOp,
+        (first, first_own): (u32, u32),
+        second: &Pending,
+        second_own: u32,
+    ) -> Option<Operation> {
+        let (code, product_code) = match op {
+            NumericOp::F32Add => (Code::F32MulAdd, Code::F32Mul),
+            NumericOp::F64Add => (Code::F64MulAdd, Code::F64Mul),
+            _ => return None,
+        };
+        let Pending::Register(second) = *second else { return None };
+        let product = |last: Option<Operation>| last.filter(|last| last.code == product_code);
+        let (addend, product) = if second == second_own
+            && let Some(product) = product(self.last_value(second))
+        {
+            (first, product)
+        } else if first == first_own
+            && let Some(product) = product(self.last_value(first))
+        {
+            (second, product)
+        } else {
+            return None;
+        };
+        // Another entry may be the same product, by `dup`: it is never above the operands of a sum, but may be the other operand.
+        let x = i16::try_from(addend).ok().filter(|_| addend != product.dst)?;
+        self.remove_last();
+        Some(Operation { code, x, ..product })
+    }
+
     /// `AND` or `OR` of which the operation just before negates one operand: takes that back and gives the operation for both.
-    fn with_negation(&mut self, op: NumericOp, first: u32, second: &Pending, second_own: u32) -> Option<Operation> {
+    fn with_negation(
+        &mut self,
+        op: NumericOp,
+        (first, first_own): (u32, u32),
+        second: &Pending,
+        second_own: u32,
+    ) -> Option<Operation> {
         let code = match op {
             NumericOp::I32And => Code::AndNot,
             NumericOp::I32Or => Code::OrNot,
@@ -128,8 +170,7 @@ impl Translator<'_> {
             && let Some(b) = negation(self.last_value(second))
         {
             (first, b)
-        } else if first >= self.registers.stack
-            && first != second
+        } else if first == first_own
             && let Some(b) = negation(self.last_value(first))
         {
             (second, b)

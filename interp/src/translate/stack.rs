@@ -54,6 +54,15 @@ pub(super) struct Element {
     pub origin: u32,
 }
 
+impl Element {
+    /// Whether the check of the indexes is the same: then both trap or none does, with the same values.
+    pub(super) fn checks_as(&self, other: &Element) -> bool {
+        let dimension = |d: &Dimension| (d.index, d.lower, d.extent);
+        (self.displacement, dimension(&self.outer), self.inner.as_ref().map(dimension))
+            == (other.displacement, dimension(&other.outer), other.inner.as_ref().map(dimension))
+    }
+}
+
 /// One dimension of an array access.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Dimension {
