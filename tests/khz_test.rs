@@ -113,7 +113,10 @@ fn builds_and_runs_pass_over_tests() {
     let output = khz().args(["build", "tests/st", "-o"]).arg(&out).output().unwrap();
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     assert_eq!(run("run tests/st --clock virtual --scans 3").status.code(), Some(0));
+    // Checking looks at them.
     assert_eq!(run("check tests/st").status.code(), Some(0));
+    let broken = scratch.write("broken.st", "TEST 'a'\n  ASSERT_EQ(1);\nEND_TEST\n");
+    assert_eq!(khz().arg("check").arg(&broken).output().unwrap().status.code(), Some(1));
 }
 
 #[test]

@@ -68,12 +68,13 @@ pub struct Compilation {
 
 /// Compiles sources, in their order, to one container for each RESOURCE.
 pub fn compile(sources: &[SourceInput], options: &CompileOptions) -> Compilation {
-    on_large_stack(|| run(sources, options, true))
+    on_large_stack(|| run(sources, options, false))
 }
 
-/// Finds everything there is to say about sources, their unit tests included, without making containers.
+/// Finds everything there is to say about sources: compiles them, because limits of the container are found only when it is made,
+/// and looks at their unit tests too.
 pub fn check(sources: &[SourceInput], options: &CompileOptions) -> Compilation {
-    on_large_stack(|| run(sources, options, false))
+    on_large_stack(|| run(sources, options, true))
 }
 
 /// Compiles the unit tests of sources ([`crate::testing`]).
@@ -113,12 +114,12 @@ fn read(inputs: &[SourceInput]) -> Parsed {
     Parsed { sources, standard, ast, diagnostics }
 }
 
-fn run(inputs: &[SourceInput], options: &CompileOptions, lowers: bool) -> Compilation {
+fn run(inputs: &[SourceInput], options: &CompileOptions, with_tests: bool) -> Compilation {
     let Parsed { sources, standard, mut ast, mut diagnostics } = read(inputs);
     let (project, found) = analysis::analyze(&ast, options.dialect, standard);
     diagnostics.extend(found);
     let mut resources = Vec::new();
-    if lowers && !has_errors(&diagnostics) {
+    if !has_errors(&diagnostics) {
         let hashes = lower::Hashes::of(inputs, &sources);
         for plan in &project.resources {
             match lower::lower(&project, plan, &ast.names, &sources, &hashes, options.strip) {
@@ -126,11 +127,8 @@ fn run(inputs: &[SourceInput], options: &CompileOptions, lowers: bool) -> Compil
                 Err(found) => diagnostics.push(*found),
             }
         }
-        if has_errors(&diagnostics) {
-            resources.clear();
-        }
     }
-    if !lowers && desugar::has_tests(&ast) {
+    if with_tests && desugar::has_tests(&ast) {
         let (units, found) = desugar::desugar(&mut ast);
         diagnostics.extend(found);
         let (_, _, found) = analysis::analyze_tests(&ast, options.dialect, standard, &units);
@@ -140,6 +138,9 @@ fn run(inputs: &[SourceInput], options: &CompileOptions, lowers: bool) -> Compil
         diagnostics.extend(
             found.into_iter().filter(|found| !seen.contains(&(found.span, found.code(), found.message.clone()))),
         );
+    }
+    if has_errors(&diagnostics) {
+        resources.clear();
     }
     Compilation { resources, diagnostics: tidy(diagnostics), sources }
 }

@@ -19,8 +19,7 @@ pub fn run(args: &CheckArgs) -> Outcome {
         }
         return Ok(Status::Done);
     };
-    // Limits of the container are found only when it is made.
-    let checked = khz_frontend::compile(&sources, &compile_options(&args.sources));
+    let checked = khz_frontend::check(&sources, &compile_options(&args.sources));
     print_diagnostics(&checked.diagnostics, &checked.sources, args.common.format);
     if args.common.format == Format::Human {
         let count = |severity| checked.diagnostics.iter().filter(|d| d.severity == severity).count();
