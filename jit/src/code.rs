@@ -112,18 +112,19 @@ impl Handle {
         &self.code
     }
 
-    /// Runs it on an image; gives the status (0: it came to its end) and the context as the code left it.
+    /// Runs it on an image; shows `look` the status (0: it came to its end) and the context as the code left it, in place: it is large to move.
     ///
     /// # Panics
     /// When the image is not of the layout that the code was compiled for, or there is no such task.
-    pub fn run(
+    pub fn run<R>(
         &self,
         image: &mut [u8],
         task_index: usize,
         deadline: &DeadlineCell,
         fuel: u64,
         virtuals: &Virtuals,
-    ) -> (i32, Context) {
+        look: impl FnOnce(i32, &Context) -> R,
+    ) -> R {
         assert!(image.len() == self.code.image_bytes as usize, "the image is of another layout than the code");
         let frame = self.code.frames.get(task_index).expect("the scheduler names only tasks that the container has");
         let start = image.as_mut_ptr();
@@ -146,7 +147,7 @@ impl Handle {
         // SAFETY: the image has the size of the layout that the code was compiled for and is lent to this call alone; the deadline cell and the
         // tables outlive it; entries have neither parameters nor results (the verifier's rule).
         let status = unsafe { self.enter(&mut context, start.wrapping_add(frame.start as usize)) };
-        (status, context)
+        look(status, &context)
     }
 
     /// Calls the code.

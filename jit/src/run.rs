@@ -17,6 +17,7 @@ use crate::build::{ProgramMemory, Scope, build};
 use crate::code::{Assembly, Code, Handle, Key, host_isa};
 use crate::context::{Context, OUT_OF_FUEL};
 use crate::lower::{Settings, lower, signature};
+use crate::passes::inline::Inliner;
 use crate::plan::{EntryPoint, Plan};
 use crate::runtime::{VirtualEntry, Virtuals};
 use crate::{JitError, JitOptions, MAX_STACK_BYTES, passes};
@@ -57,8 +58,12 @@ pub(crate) fn compile(scope: &Scope<'_>, plan: &Plan, options: JitOptions) -> Re
     let mut assembly = assembly(scope, plan, isa)?;
     let mut compilation = assembly.compilation();
     let mut builder_context = FunctionBuilderContext::new();
+    let mut inliner = Inliner::new(scope);
     for key in plan.functions.keys() {
         let mut function = build(scope, key.0, key.1);
+        if options.passes.inline && !plan.calls_virtual {
+            inliner.run(&mut function, key.1);
+        }
         passes::run(&mut function, scope.verified, options.passes, options.fuel);
         assembly.start_function();
         lower(scope, &function, key.1, settings, &mut assembly, &mut compilation.func, &mut builder_context);
@@ -206,12 +211,13 @@ impl Engine for Jit {
         };
         let fuel = limits.fuel.as_ref().map_or(u64::MAX, |fuel| fuel.left);
         let virtuals = &self.parts.virtuals;
-        let (status, context) = handle.run(image.bytes_mut(), limits.task_index, limits.deadline, fuel, virtuals);
-        let outcome = if status == 0 { Ok(()) } else { Err(self.trap(&context)) };
-        if let Some(fuel) = limits.fuel {
-            fuel.left = if context.trap_code == OUT_OF_FUEL { 0 } else { context.fuel };
-        }
-        outcome
+        let (deadline, left) = (limits.deadline, limits.fuel);
+        handle.run(image.bytes_mut(), limits.task_index, deadline, fuel, virtuals, |status, context| {
+            if let Some(left) = left {
+                left.left = if context.trap_code == OUT_OF_FUEL { 0 } else { context.fuel };
+            }
+            if status == 0 { Ok(()) } else { Err(self.trap(context)) }
+        })
     }
 
     fn code_bytes(&self) -> usize {

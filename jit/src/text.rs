@@ -12,6 +12,7 @@ use khz_machine::image::ImageLayout;
 use crate::build::{ProgramMemory, build};
 use crate::code::{Key, host_isa};
 use crate::lower::{Settings, lower};
+use crate::passes::inline::Inliner;
 use crate::plan::{self, Plan};
 use crate::run::{assembly, settings_for};
 use crate::{JitError, JitOptions, mir, passes};
@@ -57,6 +58,9 @@ fn form_of(
         return None;
     }
     let mut form = build(scope, key.0, key.1);
+    if options.passes.inline && !plan.calls_virtual {
+        Inliner::new(scope).run(&mut form, key.1);
+    }
     passes::run(&mut form, scope.verified, options.passes, options.fuel);
     Some((key, form))
 }
@@ -113,8 +117,9 @@ impl Compiled {
         lower(&scope, &form, key.1, settings, &mut module, &mut compilation.func, &mut builder_context);
         let debug = verified.container().debug.as_ref();
         let line = |location: SourceLoc| {
-            let offset = Some(location).filter(|location| !location.is_default())?.bits();
-            source_line(debug, function, offset)
+            let place = Some(location).filter(|location| !location.is_default())?.bits();
+            let data = form.places.get(place as usize)?;
+            source_line(debug, data.function, data.offset)
         };
         let clif = with_lines(&compilation.func.display().to_string(), &line);
         let mut assembly = String::new();
@@ -134,7 +139,7 @@ impl Compiled {
     }
 }
 
-/// CLIF marks lines with `@` and the bytecode offset in hexadecimal; each change of the source line gets a line of its own.
+/// CLIF marks lines with `@` and the place in hexadecimal; each change of the source line gets a line of its own.
 fn with_lines(clif: &str, line: &dyn Fn(SourceLoc) -> Option<String>) -> String {
     let mut out = String::new();
     let mut last = None;

@@ -46,7 +46,7 @@ pub struct Settings {
     pub depth: bool,
     /// Whether arithmetic itself gives the one NaN (x86-64); elsewhere results are made canonical.
     pub native_nan: bool,
-    /// Whether instructions carry their bytecode offset, for listings.
+    /// Whether instructions carry their place, for listings.
     pub source_lines: bool,
 }
 
@@ -179,8 +179,7 @@ impl Lowerer<'_, '_> {
             for instruction in &data.instructions {
                 self.place = instruction.place;
                 if self.settings.source_lines {
-                    let offset = self.function.places[self.place.index()].offset;
-                    self.builder.set_srcloc(ir::SourceLoc::new(offset));
+                    self.builder.set_srcloc(ir::SourceLoc::new(self.place.0));
                 }
                 self.instruction(instruction);
             }

@@ -8,6 +8,7 @@ pub mod deadlines;
 pub mod fold;
 pub mod for_loops;
 pub mod if_convert;
+pub mod inline;
 pub mod promote;
 pub mod ranges;
 pub mod repeats;
@@ -46,6 +47,8 @@ macro_rules! passes {
 }
 
 passes! {
+    /// [`inline`]: small functions where they are called. Runs before all others, on what is built.
+    inline;
     /// [`promote`]: slots in variables while a loop runs.
     promote;
     /// [`fold`]: constants, wraps that change nothing, decided branches.

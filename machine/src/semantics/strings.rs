@@ -35,7 +35,7 @@ impl StringPlace {
     fn characters(self, memory: &[u8]) -> Range<usize> {
         let room = self.room(memory);
         let bytes = memory.get(room.clone()).unwrap_or_default();
-        room.start..room.start + memchr::memchr(0, bytes).unwrap_or(bytes.len())
+        room.start..room.start + length(bytes)
     }
 
     /// Its characters.
@@ -44,6 +44,25 @@ impl StringPlace {
     pub fn text(self, memory: &[u8]) -> &[u8] {
         memory.get(self.characters(memory)).unwrap_or_default()
     }
+}
+
+/// How many bytes stand before the first 0. Strings of a controller are short: eight bytes at a time in place are faster than a call of a routine
+/// for long ones.
+#[inline]
+fn length(bytes: &[u8]) -> usize {
+    const ONES: u64 = u64::from_le_bytes([1; 8]);
+    const HIGH: u64 = u64::from_le_bytes([0x80; 8]);
+    let (words, rest) = bytes.as_chunks::<8>();
+    for (position, word) in words.iter().enumerate() {
+        let word = u64::from_le_bytes(*word);
+        // The lowest bit that is set marks the first 0; above it there may be false ones.
+        let zeros = word.wrapping_sub(ONES) & !word & HIGH;
+        if zeros != 0 {
+            return position * 8 + (zeros.trailing_zeros() / 8) as usize;
+        }
+    }
+    let in_rest = rest.iter().position(|byte| *byte == 0).unwrap_or(rest.len());
+    words.len() * 8 + in_rest
 }
 
 /// One copy of a part of a source to its place in the destination.

@@ -158,9 +158,9 @@ impl Emit<'_> {
                 *var = self.variable(*var, at);
                 *value = self.vector(function, *value, at);
             }
-            Op::Load(address, _) => address.displacement += number * VECTOR_BYTES,
+            Op::Load(address, _) => address.displacement = address.displacement.wrapping_add(number * VECTOR_BYTES),
             Op::Store(address, _, value) => {
-                address.displacement += number * VECTOR_BYTES;
+                address.displacement = address.displacement.wrapping_add(number * VECTOR_BYTES);
                 *value = self.vector(function, *value, at);
             }
             _ => {}

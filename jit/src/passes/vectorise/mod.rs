@@ -92,9 +92,11 @@ fn countable(function: &Function, id: LoopId, ranges: &Ranges) -> Option<(Counte
     let counted = function.loops[id.index()].counted?;
     let number = |value| ranges.constant(value).and_then(Const::as_i64);
     let (initial, bound, step) = (number(counted.initial)?, number(counted.bound)?, number(counted.step)?);
-    let passes = bound - initial + 1;
+    let passes = bound.checked_sub(initial)?.checked_add(1)?;
     let is_plain = counted.ty == khz_bytecode::value::IntegerType::I32 && step == 1;
-    (is_plain && (1..MOST_PASSES).contains(&passes) && bound < i64::from(i32::MAX)).then_some((counted, passes))
+    // The last step must not leave the type.
+    let ends = bound < i64::from(i32::MAX) - 64;
+    (is_plain && ends && (1..MOST_PASSES).contains(&passes)).then_some((counted, passes))
 }
 
 /// Where a header leads to: the test whether the inner loop is empty is decided by its constants.
