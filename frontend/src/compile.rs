@@ -72,7 +72,7 @@ pub fn compile(sources: &[SourceInput], options: &CompileOptions) -> Compilation
 }
 
 /// Finds everything there is to say about sources: compiles them, because limits of the container are found only when it is made,
-/// and looks at their unit tests too.
+/// and looks at their unit tests too. Gives no containers.
 pub fn check(sources: &[SourceInput], options: &CompileOptions) -> Compilation {
     on_large_stack(|| run(sources, options, true))
 }
@@ -139,7 +139,7 @@ fn run(inputs: &[SourceInput], options: &CompileOptions, with_tests: bool) -> Co
             found.into_iter().filter(|found| !seen.contains(&(found.span, found.code(), found.message.clone()))),
         );
     }
-    if has_errors(&diagnostics) {
+    if with_tests || has_errors(&diagnostics) {
         resources.clear();
     }
     Compilation { resources, diagnostics: tidy(diagnostics), sources }
