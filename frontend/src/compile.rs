@@ -114,7 +114,7 @@ fn read(inputs: &[SourceInput]) -> Parsed {
     Parsed { sources, standard, ast, diagnostics }
 }
 
-fn run(inputs: &[SourceInput], options: &CompileOptions, with_tests: bool) -> Compilation {
+fn run(inputs: &[SourceInput], options: &CompileOptions, only_checks: bool) -> Compilation {
     let Parsed { sources, standard, mut ast, mut diagnostics } = read(inputs);
     let (project, found) = analysis::analyze(&ast, options.dialect, standard);
     diagnostics.extend(found);
@@ -128,7 +128,7 @@ fn run(inputs: &[SourceInput], options: &CompileOptions, with_tests: bool) -> Co
             }
         }
     }
-    if with_tests && desugar::has_tests(&ast) {
+    if only_checks && desugar::has_tests(&ast) {
         let (units, found) = desugar::desugar(&mut ast);
         diagnostics.extend(found);
         let (_, _, found) = analysis::analyze_tests(&ast, options.dialect, standard, &units);
@@ -139,7 +139,7 @@ fn run(inputs: &[SourceInput], options: &CompileOptions, with_tests: bool) -> Co
             found.into_iter().filter(|found| !seen.contains(&(found.span, found.code(), found.message.clone()))),
         );
     }
-    if with_tests || has_errors(&diagnostics) {
+    if only_checks || has_errors(&diagnostics) {
         resources.clear();
     }
     Compilation { resources, diagnostics: tidy(diagnostics), sources }

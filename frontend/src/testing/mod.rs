@@ -25,7 +25,7 @@ pub const MAX_TESTS: usize = 10_000;
 
 /// How many bytes of SETUP and TEARDOWN one compilation may come to, each counted once for every test that it belongs to: it is
 /// compiled with each.
-pub const MAX_FIXTURE_BYTES: u64 = 8 << 20;
+pub const MAX_FIXTURE_BYTES: u64 = 3 << 20;
 
 /// Tests, compiled.
 #[derive(Debug)]
