@@ -5,7 +5,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::{MAX_FIXTURE_BYTES, MAX_TESTS, TestUnit};
-use crate::diagnostics::{Diagnostic, syntax as rules};
+use crate::diagnostics::{Diagnostic, Severity, syntax as rules};
 use crate::source::Span;
 use crate::syntax::ast::{
     Ast, BinaryOp, Block, Declaration, Expr, ExprId, ExprKind, Ident, IfBranch, Literal, LiteralValue, Pou, PouKind,
@@ -58,7 +58,7 @@ pub(crate) fn desugar(ast: &mut Ast) -> (Vec<TestUnit>, Vec<Diagnostic>) {
     let mut units = Vec::new();
     let mut fixture_bytes = 0;
     for (file, suite) in ast.files.iter_mut().zip(suites) {
-        refuse_twins(&suite, &mut found);
+        warn_of_twins(&suite, &mut found);
         for test in &suite.tests {
             fixture_bytes += fixture_size(test, &suite);
             if fixture_bytes > MAX_FIXTURE_BYTES {
@@ -108,12 +108,15 @@ fn fixture_size(test: &Test, suite: &TestSuite) -> u64 {
 }
 
 /// Two tests of one name in one file can not be told apart in a report.
-fn refuse_twins(suite: &TestSuite, found: &mut Vec<Diagnostic>) {
+fn warn_of_twins(suite: &TestSuite, found: &mut Vec<Diagnostic>) {
     let mut names: BTreeMap<&str, Span> = BTreeMap::new();
     for test in suite.tests.iter().filter(|test| !test.name.is_empty()) {
         if let Some(first) = names.insert(&test.name, test.name_span) {
             let message = format!("there are two tests `{}` in this file", test.name);
-            found.push(Diagnostic::new(&rules::BAD_TEST, test.name_span, message).label(first, "the first is here"));
+            let mut twin = Diagnostic::new(&rules::BAD_TEST, test.name_span, message).label(first, "the first is here");
+            // Both run all the same, as other runners do it.
+            twin.severity = Severity::Warning;
+            found.push(twin);
         }
     }
 }
