@@ -122,6 +122,8 @@ macro_rules! define_run {
         [$(($float:ident, $float_ty:ty, $canonical:ident, $foreign:ident, $foreign_based:ident, $foreign_element:ident, $foreign_element_based:ident,
             $foreign_plane:ident, $foreign_plane_based:ident)),*]
         [$(($compare:ident, $compare_function:ident, [$($compare_operand:ident)*], $if_:ident, $unless:ident, $if_const:ident, $unless_const:ident)),*]
+        [$(($on_element:ident, $on_function:ident, $on_ty:ty, $on_load:ident, $on_load_plane:ident, $with_element:ident, $with_plane:ident, $commutes:literal)),*]
+        [$(($sum:ident, $sum_add:ident, $sum_multiply:ident, $sum_ty:ty, $sum_product:ident, $sum_product_plane:ident, $sum_element:ident, $sum_plane:ident)),*]
     ) => {
         /// Runs from the start of `function` until it returns.
         ///
@@ -154,9 +156,10 @@ macro_rules! define_run {
             }
             // Image offset of an element; its bounds and stride stand behind the operation.
             macro_rules! element {
-                ($op:ident, $base:expr) => {{
+                ($op:ident, $base:expr) => { element!($op, i32::from($op.x), $base) };
+                ($op:ident, $displacement:expr, $base:expr) => {{
                     let data = cursor.fetch();
-                    let index = (registers.get($op.a) as i32).wrapping_add(i32::from($op.x));
+                    let index = (registers.get($op.a) as i32).wrapping_add($displacement);
                     match element_distance(data, index) {
                         Ok(distance) => ($base + u64::from(data.dst) + distance) as usize,
                         Err(values) => break (TrapCode::ArrayIndex, values),
@@ -303,6 +306,37 @@ macro_rules! define_run {
                         Code::$if_const => jump_if!(compute!(own, $compare_function, [$($compare_operand)*], registers, program, op) != 0, op),
                         Code::$unless_const => jump_if!(compute!(own, $compare_function, [$($compare_operand)*], registers, program, op) == 0, op),
                     )*
+                    // `x` is the register of the first operand, so there is no constant part of the index.
+                    $(
+                        Code::$with_element => {
+                            let at = element!(op, 0, reference!(op.b));
+                            let element: $on_ty = Lane::from_bits(<$on_ty as Scalar>::load(memory, at));
+                            let first = Lane::from_bits(registers.get(op.x as u32));
+                            registers.set(op.dst, semantics::$on_function(first, element).into_bits());
+                        }
+                        Code::$with_plane => {
+                            let at = plane_element!(op, reference!(op.b));
+                            let element: $on_ty = Lane::from_bits(<$on_ty as Scalar>::load(memory, at));
+                            let first = Lane::from_bits(registers.get(op.x as u32));
+                            registers.set(op.dst, semantics::$on_function(first, element).into_bits());
+                        }
+                    )*
+                    $(
+                        Code::$sum_element => {
+                            let at = element!(op, 0, reference!(op.b));
+                            let element: $sum_ty = Lane::from_bits(<$sum_ty as Scalar>::load(memory, at));
+                            let product = semantics::$sum_multiply(Lane::from_bits(registers.get(op.x as u32)), element);
+                            let sum = semantics::$sum_add(Lane::from_bits(registers.get(op.dst)), product);
+                            registers.set(op.dst, sum.into_bits());
+                        }
+                        Code::$sum_plane => {
+                            let at = plane_element!(op, reference!(op.b));
+                            let element: $sum_ty = Lane::from_bits(<$sum_ty as Scalar>::load(memory, at));
+                            let product = semantics::$sum_multiply(Lane::from_bits(registers.get(op.x as u32)), element);
+                            let sum = semantics::$sum_add(Lane::from_bits(registers.get(op.dst)), product);
+                            registers.set(op.dst, sum.into_bits());
+                        }
+                    )*
                     Code::Enter => {
                         registers.zero(op.dst, op.a);
                         memory[frame as usize..(frame + op.b) as usize].fill(0);
@@ -392,6 +426,14 @@ macro_rules! define_run {
                         let product = semantics::f64_mul(Lane::from_bits(registers.get(op.a)), Lane::from_bits(registers.get(op.b)));
                         let sum = semantics::f64_add(Lane::from_bits(registers.get(op.x as u32)), product);
                         registers.set(op.dst, sum.into_bits());
+                    }
+                    Code::OrAnd => {
+                        let both = registers.get(op.a) as u32 & registers.get(op.b) as u32;
+                        registers.set(op.dst, u64::from(registers.get(op.x as u32) as u32 | both));
+                    }
+                    Code::OrAndNot => {
+                        let both = registers.get(op.a) as u32 & u32::from(registers.get(op.b) as u32 == 0);
+                        registers.set(op.dst, u64::from(registers.get(op.x as u32) as u32 | both));
                     }
                     Code::AndNot => {
                         let (first, second) = (registers.get(op.a) as u32, registers.get(op.b) as u32);

@@ -41,6 +41,8 @@ macro_rules! define_code {
         [$(($float:ident, $float_ty:ty, $canonical:ident, $foreign:ident, $foreign_based:ident, $foreign_element:ident, $foreign_element_based:ident,
             $foreign_plane:ident, $foreign_plane_based:ident)),*]
         [$(($compare:ident, $compare_function:ident, [$($compare_operand:ident)*], $if_:ident, $unless:ident, $if_const:ident, $unless_const:ident)),*]
+        [$(($on_element:ident, $on_function:ident, $on_ty:ty, $on_load:ident, $on_load_plane:ident, $with_element:ident, $with_plane:ident, $commutes:literal)),*]
+        [$(($sum:ident, $sum_add:ident, $sum_multiply:ident, $sum_ty:ty, $sum_product:ident, $sum_product_plane:ident, $sum_element:ident, $sum_plane:ident)),*]
     ) => {
         /// What an operation does. Numeric rows appear twice: `I32Add` reads both operands from registers, `i32_add` takes the last one
         /// from `b` (32-bit types) or from constant number `b` (64-bit types).
@@ -53,6 +55,8 @@ macro_rules! define_code {
             $store, $store_based, $store_element, $store_element_based, $store_plane, $store_plane_based, $store_const, $store_based_const,)*
             $($foreign, $foreign_based, $foreign_element, $foreign_element_based, $foreign_plane, $foreign_plane_based,)*
             $($if_, $unless, $if_const, $unless_const,)*
+            $($with_element, $with_plane,)*
+            $($sum_element, $sum_plane,)*
             /// Start of a function: deadline; zeroes `a` registers from `dst` on and `b` frame bytes.
             Enter,
             /// Start of a loop's pass: deadline.
@@ -87,6 +91,10 @@ macro_rules! define_code {
             F32MulAdd,
             /// As `F32MulAdd`.
             F64MulAdd,
+            /// `dst` := register `x` or (`a` and `b`).
+            OrAnd,
+            /// `dst` := register `x` or (`a` and (`b` = 0)).
+            OrAndNot,
             /// `dst` := `a` and (`b` = 0).
             AndNot,
             /// `dst` := `a` or (`b` = 0).
@@ -185,6 +193,25 @@ macro_rules! define_code {
                 },)*
                 _ => access_codes(storage).load,
             }
+        }
+
+        /// A numeric operation on registers whose last operand the operation `load` brings from an array: the operation on the
+        /// element itself, and whether the operands may change places.
+        pub(crate) fn element_operand_code(code: Code, load: Code) -> Option<(Code, bool)> {
+            Some(match (code, load) {
+                $((Code::$on_element, Code::$on_load) => (Code::$with_element, $commutes),)*
+                $((Code::$on_element, Code::$on_load_plane) => (Code::$with_plane, $commutes),)*
+                _ => return None,
+            })
+        }
+
+        /// The operation that adds to its own result register the product that `product` computes.
+        pub(crate) fn sum_code(add: Code, product: Code) -> Option<Code> {
+            Some(match (add, product) {
+                $((Code::$sum, Code::$sum_product) => Code::$sum_element,)*
+                $((Code::$sum, Code::$sum_product_plane) => Code::$sum_plane,)*
+                _ => return None,
+            })
         }
 
         /// The branches that a comparison can be fused with: (if, unless).

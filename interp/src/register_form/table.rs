@@ -3,7 +3,7 @@
 //! [`for_each_operation!`] hands all of them, with the numeric rows in front, to one macro. The operation codes, what the
 //! translation looks up, and the dispatch are derived from that, so a code without a handler does not compile.
 
-/// Hands all rows to `$callback!`: `[numeric rows] [accesses] [canonical float loads] [comparisons]`.
+/// Hands all rows to `$callback!`: `[numeric rows] [accesses] [canonical float loads] [comparisons] [on an element] [sums]`.
 ///
 /// - numeric row: as in [`khz_bytecode::for_each_numeric!`]; `Variant` takes its operands from registers, `function` (as a name of an
 ///   operation) takes its last operand from the operation itself;
@@ -11,7 +11,10 @@
 ///   StoreImage, ...)`. *Image*: the place counts from the image's start; *based*: from a register; *element*: of an array of one
 ///   dimension; *plane*: of two;
 /// - canonical float load: the six loads of an access, where any NaN may stand;
-/// - comparison: `(numeric variant, function, [operands], If, Unless, IfConst, UnlessConst)`.
+/// - comparison: `(numeric variant, function, [operands], If, Unless, IfConst, UnlessConst)`;
+/// - on an element: `(numeric variant, function, type, load of an element, of a plane's, the function on such an element as its last
+///   operand, on a plane's, whether operands may change places)`;
+/// - sum: `(Add variant, add, multiply, type, product with an element, with a plane's, sum with that product, with a plane's)`.
 macro_rules! for_each_operation {
     (@own $callback:ident, [$($numeric:tt),*]) => {
         $callback! {
@@ -75,6 +78,22 @@ macro_rules! for_each_operation {
                 (F64Le, f64_le, [F64 F64], IfF64Le, UnlessF64Le, IfF64LeConst, UnlessF64LeConst),
                 (F64Gt, f64_gt, [F64 F64], IfF64Gt, UnlessF64Gt, IfF64GtConst, UnlessF64GtConst),
                 (F64Ge, f64_ge, [F64 F64], IfF64Ge, UnlessF64Ge, IfF64GeConst, UnlessF64GeConst)
+            ]
+            [
+                (I32Add, i32_add, i32, LoadElementBasedI32, LoadPlaneBasedI32, I32AddElement, I32AddPlane, true),
+                (I32Sub, i32_sub, i32, LoadElementBasedI32, LoadPlaneBasedI32, I32SubElement, I32SubPlane, false),
+                (I32Mul, i32_mul, i32, LoadElementBasedI32, LoadPlaneBasedI32, I32MulElement, I32MulPlane, true),
+                (I32Xor, i32_xor, i32, LoadElementBasedI32, LoadPlaneBasedI32, I32XorElement, I32XorPlane, true),
+                (F32Add, f32_add, f32, LoadElementBasedF32, LoadPlaneBasedF32, F32AddElement, F32AddPlane, true),
+                (F32Sub, f32_sub, f32, LoadElementBasedF32, LoadPlaneBasedF32, F32SubElement, F32SubPlane, false),
+                (F32Mul, f32_mul, f32, LoadElementBasedF32, LoadPlaneBasedF32, F32MulElement, F32MulPlane, true),
+                (F64Add, f64_add, f64, LoadElementBasedF64, LoadPlaneBasedF64, F64AddElement, F64AddPlane, true),
+                (F64Sub, f64_sub, f64, LoadElementBasedF64, LoadPlaneBasedF64, F64SubElement, F64SubPlane, false),
+                (F64Mul, f64_mul, f64, LoadElementBasedF64, LoadPlaneBasedF64, F64MulElement, F64MulPlane, true)
+            ]
+            [
+                (F32Add, f32_add, f32_mul, f32, F32MulElement, F32MulPlane, F32SumElement, F32SumPlane),
+                (F64Add, f64_add, f64_mul, f64, F64MulElement, F64MulPlane, F64SumElement, F64SumPlane)
             ]
         }
     };

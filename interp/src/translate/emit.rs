@@ -8,7 +8,7 @@ use khz_bytecode::verify::BasicBlock;
 
 use super::Translator;
 use super::numeric::is_wrapped;
-use crate::register_form::{Code, Operation};
+use crate::register_form::{Code, Operation, sum_code};
 
 /// A jump target to be filled in when all blocks have their places.
 #[derive(Debug, Clone, Copy)]
@@ -74,6 +74,8 @@ impl Translator<'_> {
         match operation.code {
             Code::I32And => self.is_bool(operation.a) || self.is_bool(operation.b),
             Code::AndNot | Code::Move => self.is_bool(operation.a),
+            Code::OrAnd => self.is_bool(operation.x as u32) && (self.is_bool(operation.a) || self.is_bool(operation.b)),
+            Code::OrAndNot => self.is_bool(operation.x as u32) && self.is_bool(operation.a),
             Code::I32Or | Code::I32Xor => self.is_bool(operation.a) && self.is_bool(operation.b),
             Code::OrNot => self.is_bool(operation.a),
             Code::i32_and => operation.b <= 1,
@@ -142,8 +144,39 @@ impl Translator<'_> {
         self.program.operations.len().checked_sub(1 + self.data_behind)
     }
 
+    /// Puts an operation in the place of the last one; the data behind it stays.
+    pub(super) fn replace_last(&mut self, operation: Operation) {
+        if let Some(at) = self.last_position() {
+            self.program.operations[at] = operation;
+            self.redirect_last(operation.dst);
+        }
+    }
+
+    /// When the last operation adds to `register` the product that the one before computes: lets that one do both.
+    fn sum_into(&mut self, register: u32) -> bool {
+        let Some(add) = self.last_position().map(|at| (at, self.program.operations[at])) else { return false };
+        let (at, add) = add;
+        let start = self.block_starts[self.block] as usize;
+        let before = self.program.operations[start..at].iter().rposition(|o| o.code != Code::Data).map(|b| start + b);
+        let Some(before) = before.filter(|_| self.data_behind == 0) else { return false };
+        let product = self.program.operations[before];
+        let Some(code) = sum_code(add.code, product.code) else { return false };
+        // A `dup` may have left the product on the stack as well.
+        let is_product = product.dst >= self.registers.stack
+            && !self.stack.iter().any(|entry| entry.value.reads(product.dst))
+            && [(register, product.dst), (product.dst, register)].contains(&(add.a, add.b));
+        if is_product {
+            self.remove_last();
+            self.program.operations[before] = Operation { code, dst: register, ..product };
+        }
+        is_product
+    }
+
     /// Redirects the last operation to write `register` instead.
     pub(super) fn redirect_last(&mut self, register: u32) {
+        if register < self.registers.stack && self.sum_into(register) {
+            return;
+        }
         if let Some(at) = self.last_position() {
             self.program.operations[at].dst = register;
             if let Some(depth) = register.checked_sub(self.registers.stack) {

@@ -281,10 +281,9 @@ impl Translator<'_> {
                 self.compute(&Pending::Element(element), own);
                 (base, offset) = (Base::Register(own), 0);
             }
-            let (index, displacement) = match self.displaced_index(&index, own_index) {
-                Some(found) if position + 1 == count => found,
-                _ => (self.in_register(&index, own_index), 0),
-            };
+            // Only for the top of the stack: the entries above another index may be copies of it.
+            let displaced = if position + 1 == count { self.displaced_index(&index, own_index) } else { None };
+            let (index, displacement) = displaced.unwrap_or_else(|| (self.in_register(&index, own_index), 0));
             let outer = Dimension { index, lower: *lower, extent, stride };
             pending = Some(Element { base, offset, displacement, outer, inner: None, origin: self.origin });
         }

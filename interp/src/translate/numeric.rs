@@ -8,7 +8,8 @@ use khz_bytecode::value::{IntegerType, Storage, ValueType};
 use super::Translator;
 use super::stack::Pending;
 use crate::register_form::{
-    Code, Operation, RangeCheck, access_codes, branch_codes, helper_number, numeric_code, numeric_const_code,
+    Code, Operation, RangeCheck, access_codes, branch_codes, element_operand_code, helper_number, numeric_code,
+    numeric_const_code,
 };
 
 /// The operation that wraps a value as a store to an `L` slot of this storage and a load from it would; none where that changes nothing.
@@ -103,6 +104,11 @@ impl Translator<'_> {
             self.value(Operation { dst, ..operation });
             return self.push_result();
         }
+        if let Some(a) = first
+            && self.on_element(op, (a, first_own), &last.value, last_own)
+        {
+            return self.push_result();
+        }
         let operation = match last.value {
             Pending::Constant(bits) => {
                 let b = self.own_operand(op, bits);
@@ -118,7 +124,7 @@ impl Translator<'_> {
         self.push_result();
     }
 
-    /// A sum of which the operation just before computes one operand as a product: takes that back and gives the operation for both.
+    /// A sum or an `OR` of which the operation just before computes one operand as a product or an `AND`: takes that back and gives the operation for both.
     /// Which operand it is does not matter: a sum of floats does not depend on their order, as there is one NaN.
     fn with_product(
         &mut self,
@@ -127,14 +133,16 @@ impl Translator<'_> {
         second: &Pending,
         second_own: u32,
     ) -> Option<Operation> {
-        let (code, product_code) = match op {
-            NumericOp::F32Add => (Code::F32MulAdd, Code::F32Mul),
-            NumericOp::F64Add => (Code::F64MulAdd, Code::F64Mul),
-            _ => return None,
+        let code_for = |product: Code| match (op, product) {
+            (NumericOp::F32Add, Code::F32Mul) => Some(Code::F32MulAdd),
+            (NumericOp::F64Add, Code::F64Mul) => Some(Code::F64MulAdd),
+            (NumericOp::I32Or, Code::I32And) => Some(Code::OrAnd),
+            (NumericOp::I32Or, Code::AndNot) => Some(Code::OrAndNot),
+            _ => None,
         };
         let Pending::Register(second) = *second else { return None };
-        let product = |last: Option<Operation>| last.filter(|last| last.code == product_code);
-        let (addend, product) = if second == second_own
+        let product = |last: Option<Operation>| last.and_then(|last| Some((last, code_for(last.code)?)));
+        let (addend, (product, code)) = if second == second_own
             && let Some(product) = product(self.last_value(second))
         {
             (first, product)
@@ -149,6 +157,27 @@ impl Translator<'_> {
         let x = i16::try_from(addend).ok().filter(|_| addend != product.dst)?;
         self.remove_last();
         Some(Operation { code, x, ..product })
+    }
+
+    /// An operation of which the load just before brings one operand from an array: the load becomes both.
+    fn on_element(&mut self, op: NumericOp, (first, first_own): (u32, u32), second: &Pending, second_own: u32) -> bool {
+        let Pending::Register(second) = *second else { return false };
+        let (loaded, other) = if second == second_own && self.last_value(second).is_some() {
+            (second, first)
+        } else if first == first_own && first != second {
+            (first, second)
+        } else {
+            return false;
+        };
+        let Some(load) = self.last_value(loaded).filter(|load| load.x == 0) else { return false };
+        let Some((code, commutes)) = element_operand_code(numeric_code(op), load.code) else { return false };
+        let Ok(x) = i16::try_from(other) else { return false };
+        if other == loaded || (loaded != second && !commutes) {
+            return false;
+        }
+        let dst = self.next_register();
+        self.replace_last(Operation { code, x, dst, ..load });
+        true
     }
 
     /// `AND` or `OR` of which the operation just before negates one operand: takes that back and gives the operation for both.
@@ -171,6 +200,7 @@ impl Translator<'_> {
         {
             (first, b)
         } else if first == first_own
+            && first != second
             && let Some(b) = negation(self.last_value(first))
         {
             (second, b)

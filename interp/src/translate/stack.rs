@@ -89,7 +89,8 @@ impl Dimension {
 }
 
 impl Pending {
-    fn reads(&self, register: u32) -> bool {
+    /// Whether it is read from a register.
+    pub(super) fn reads(&self, register: u32) -> bool {
         match self {
             Pending::Register(source) => *source == register,
             Pending::Constant(_) => false,
