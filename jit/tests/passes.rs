@@ -2,8 +2,8 @@
 
 mod common;
 
-use common::form;
-use khz_jit::Passes;
+use common::{form, load_with};
+use khz_jit::{JitOptions, Passes};
 
 /// An array summed by a FOR loop over a slot of the program.
 const SUM: &str = "global sum i32\ntype n scalar i32\narray v n 0..9\ndata a v\nprogram p_\nslot i i32\nslot flag b1\n\
@@ -138,4 +138,73 @@ fn a_bound_beyond_the_type_of_the_control_variable_proves_nothing() {
     let form = form(&text, Passes::ALL);
     assert_eq!((count(&form, "check.index"), count(&form, "no deadline")), (1, 0), "{form}");
     assert_eq!(count(&form, "i64.extend_i32_s"), 1, "{form}");
+}
+
+#[test]
+fn a_small_function_is_put_where_it_is_called_and_its_traps_name_the_call() {
+    let text = "global r i32\ntype n scalar i32\ndata d n\nfunction main\naddress d d n\ncall half\nslot.store g r\nreturn\nend\n\
+        function half\nparam p ref:n\nresult i32\nconst.i32 6\nslot.load l p\nref.load i32\ni32.div_s\nreturn\nend\n";
+    let before = form(text, Passes::NONE);
+    let after = form(text, only(&["inline"]));
+    assert_eq!((count(&before, "call f1"), count(&before, "i32.div_s")), (1, 0), "{before}");
+    assert_eq!((count(&after, "call f1"), count(&after, "i32.div_s")), (0, 1), "{after}");
+    let called = load_with(text, JitOptions { passes: Passes::NONE, ..JitOptions::default() }).run();
+    let inlined = load_with(text, JitOptions { passes: only(&["inline"]), ..JitOptions::default() }).run();
+    assert!(called.is_err());
+    assert_eq!(inlined, called);
+}
+
+#[test]
+fn a_function_with_a_loop_or_behind_virtual_calls_is_called() {
+    let text =
+        "global r i32\nfunction main\ncall f\nreturn\nend\nfunction f\ntop:\nslot.load g r\njump.if top\nreturn\nend\n";
+    assert_eq!(count(&form(text, Passes::ALL), "call f1"), 1);
+}
+
+#[test]
+fn a_flag_that_ends_a_loop_leaves_it_at_once() {
+    let text = "global go b1\nglobal n i32\nfunction main\nconst.i32 1\nslot.store g go\ntop:\nslot.load g go\njump.unless out\n\
+        slot.load g n\nconst.i32 5\ni32.gt_s\njump.if end_\nslot.load g n\nconst.i32 1\ni32.add\nslot.store g n\njump top\n\
+        end_:\nconst.i32 0\nslot.store g go\njump top\nout:\nreturn\nend\n";
+    let names = ["promote", "fold"];
+    let before = form(text, only(&names));
+    let after = form(text, only(&[names[0], names[1], "threads"]));
+    // The way charges what the header charges, and does not come back to it.
+    assert_eq!(count(&before, "no deadline"), 0, "{before}");
+    assert_eq!(count(&after, "no deadline"), 1, "{after}");
+}
+
+#[test]
+fn an_index_is_checked_once_on_a_way() {
+    let element = "address d a v\nslot.load g sum\nref.index v\n";
+    let text = format!(
+        "global sum i32\ntype n scalar i32\narray v n 0..9\ndata a v\nfunction main\nlocal x i32\n{element}ref.load i32\nslot.store l x\n\
+         top:\nslot.load l x\ndrop\n{}slot.load l x\njump.if top\nreturn\nend\n",
+        "address d a v\nslot.load l x\nref.index v\nref.load i32\ndrop\naddress d a v\nslot.load l x\nref.index v\nref.load i32\ndrop\n"
+    );
+    let checks = |passes: &[&str]| count(&form(&text, only(passes)), "check.index");
+    assert_eq!((checks(&[]), checks(&["repeats"])), (3, 2));
+    let changed = text.replace("drop\naddress d a v\nslot.load l x", "slot.store l x\naddress d a v\nslot.load l x");
+    assert_eq!(count(&form(&changed, only(&["repeats"])), "check.index"), 3);
+}
+
+#[test]
+fn loops_over_independent_floats_run_in_vectors() {
+    let text = |store: &str, last: u32| {
+        format!(
+            "type n scalar f32\narray v n 0..99\ndata a v\ndata b v\nprogram p_\nslot i i32\nslot s f32\nfunction main program p_\nfor k p i i32\n\
+             const.i32 0\nconst.i32 {last}\nconst.i32 1\nfor.enter k out\ntop:\naddress d a v\n{store}ref.index v\n\
+             address d b v\nslot.load p i\nref.index v\nref.load f32\nconst f32 2.0\nf32.mul\nref.store f32\n\
+             slot.load p s\naddress d b v\nslot.load p i\nref.index v\nref.load f32\nf32.add\nslot.store p s\nfor.next k top\nout:\nreturn\nend\n"
+        )
+    };
+    let own = "slot.load p i\n";
+    let vectors = form(&text(own, 15), Passes::ALL);
+    assert!(vectors.contains("f32x4") && count(&vectors, "lane v") == 4, "{vectors}");
+    // A number of passes that does not divide, an element of another pass, code that charges fuel: one pass after the other.
+    for other in [text(own, 14), text("slot.load p i\nconst.i32 2\ni32.mul\n", 15), text("const.i32 3\n", 15)] {
+        assert!(!form(&other, Passes::ALL).contains("f32x4"));
+    }
+    let recurrence = text("slot.load p i\nconst.i32 1\ni32.add\n", 15).replace("address d b v", "address d a v");
+    assert!(!form(&recurrence, Passes::ALL).contains("f32x4"));
 }
