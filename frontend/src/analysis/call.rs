@@ -209,39 +209,52 @@ impl<'a> Checker<'_, 'a> {
                 continue;
             }
             seen.push(name.symbol);
-            let found = parameters.iter().find(|(_, var)| var.symbol == name.symbol);
-            let text = self.an.text(name.symbol);
-            match (found, output, value) {
-                // A unit may declare EN itself (6.6.1.7): it is the condition of the call all the same.
-                (Some((_, var)), None, Some(value)) if is_en(text, var) => bound.en = Some(value),
-                (Some((id, var)), Some(negated), Some(value)) if is_eno(text, var) => {
-                    bound.outputs.push((*id, value, negated));
-                    bound.eno = Some((value, negated));
-                    bound.declares_eno = true;
-                }
-                (None, None, Some(value)) if text == "EN" => bound.en = Some(value),
-                (None, Some(negated), Some(value)) if text == "ENO" => bound.eno = Some((value, negated)),
-                (None, _, _) if text == "EN" || text == "ENO" => {}
-                (None, ..) => {
-                    self.unknown_parameter(info, name, &parameters);
-                    sound = false;
-                }
-                (Some((_, var)), Some(_), _) if var.class != VarClass::Output => {
-                    let message = format!("`{}` is no output; write `:=`", var.name);
-                    self.an.report(&names::UNKNOWN_PARAMETER, name.span, message);
-                    sound = false;
-                }
-                (Some((_, var)), None, _) if var.class == VarClass::Output => {
-                    let message = format!("`{}` is an output; write `=>`", var.name);
-                    self.an.report(&names::UNKNOWN_PARAMETER, name.span, message);
-                    sound = false;
-                }
-                (Some((id, _)), Some(negated), Some(value)) => bound.outputs.push((*id, value, negated)),
-                (Some((id, _)), None, Some(value)) => bound.inputs.push((*id, value)),
-                (Some(_), _, None) => {}
-            }
+            sound &= self.bind_named(info, &parameters, (name, value, output), &mut bound);
         }
         sound.then_some(bound)
+    }
+
+    /// Binds an argument that names its parameter: the name, the value or target if there is one, and for an output whether it is negated.
+    /// FALSE: it was reported.
+    fn bind_named(
+        &mut self,
+        info: &PouInfo,
+        parameters: &[(VarId, &VarInfo)],
+        (name, value, output): (&Ident, Option<&'a ast::Expr>, Option<bool>),
+        bound: &mut Bound<'a>,
+    ) -> bool {
+        let text = self.an.text(name.symbol);
+        let found = parameters.iter().find(|(_, var)| var.symbol == name.symbol);
+        match (found, output, value) {
+            // A unit may declare EN itself (6.6.1.7): it is the condition of the call all the same.
+            (Some((_, var)), None, Some(value)) if is_en(text, var) => bound.en = Some(value),
+            (Some((id, var)), Some(negated), Some(value)) if is_eno(text, var) => {
+                bound.outputs.push((*id, value, negated));
+                bound.eno = Some((value, negated));
+                bound.declares_eno = true;
+            }
+            (None, None, Some(value)) if text == "EN" => bound.en = Some(value),
+            (None, Some(negated), Some(value)) if text == "ENO" => bound.eno = Some((value, negated)),
+            (None, _, _) if text == "EN" || text == "ENO" => {}
+            (None, ..) => {
+                self.unknown_parameter(info, name, parameters);
+                return false;
+            }
+            (Some((_, var)), Some(_), _) if var.class != VarClass::Output => {
+                let message = format!("`{}` is no output; write `:=`", var.name);
+                self.an.report(&names::UNKNOWN_PARAMETER, name.span, message);
+                return false;
+            }
+            (Some((_, var)), None, _) if var.class == VarClass::Output => {
+                let message = format!("`{}` is an output; write `=>`", var.name);
+                self.an.report(&names::UNKNOWN_PARAMETER, name.span, message);
+                return false;
+            }
+            (Some((id, _)), Some(negated), Some(value)) => bound.outputs.push((*id, value, negated)),
+            (Some((id, _)), None, Some(value)) => bound.inputs.push((*id, value)),
+            (Some(_), _, None) => {}
+        }
+        true
     }
 
     fn unknown_parameter(&mut self, info: &PouInfo, name: &Ident, parameters: &[(VarId, &VarInfo)]) {
@@ -269,7 +282,9 @@ impl<'a> Checker<'_, 'a> {
             let given = bound.inputs.iter().find(|(other, _)| *other == id).map(|(_, value)| *value);
             match var.class {
                 // The body runs only when EN is TRUE.
-                VarClass::Input if given.is_none() && is_en(self.an.text(var.symbol), var) => inputs.push((id, truth(span))),
+                VarClass::Input if given.is_none() && is_en(self.an.text(var.symbol), var) => {
+                    inputs.push((id, truth(span)));
+                }
                 VarClass::Input => match self.input_value(var, given, span) {
                     Some(value) => {
                         self.note_parameter((pou, id), &value);
@@ -294,7 +309,18 @@ impl<'a> Checker<'_, 'a> {
         let eno = bound.eno.and_then(|(eno, _)| self.eno(eno));
         let eno_is_given = bound.declares_eno;
         let before = Vec::new();
-        sound.then(|| Call { target: pou, instance: None, en, eno, eno_is_given, inputs, before, inouts, after, span })
+        sound.then_some(Call {
+            target: pou,
+            instance: None,
+            en,
+            eno,
+            eno_is_given,
+            inputs,
+            before,
+            inouts,
+            after,
+            span,
+        })
     }
 
     fn input_value(&mut self, var: &VarInfo, given: Option<&'a ast::Expr>, span: Span) -> Option<Expr> {
@@ -457,6 +483,6 @@ impl<'a> Checker<'_, 'a> {
         let eno = bound.eno.and_then(|(eno, _)| self.eno(eno));
         let (instance, eno_is_given) = (Some(instance), bound.declares_eno);
         let inputs = Vec::new();
-        sound.then(|| Call { target: pou, instance, en, eno, eno_is_given, inputs, before, inouts, after, span })
+        sound.then_some(Call { target: pou, instance, en, eno, eno_is_given, inputs, before, inouts, after, span })
     }
 }
