@@ -193,5 +193,8 @@ fn a_fixture_does_not_grow_with_the_number_of_tests_without_end() {
     let text = format!("SETUP VAR n : INT; END_VAR\n{setup}END_SETUP\n{tests}");
     let found = compile_tests(&sources(&text), &CompileOptions::default());
     assert!(found.tests.is_empty());
-    assert_eq!(found.diagnostics.iter().map(|one| one.code()).collect::<Vec<_>>(), ["P0031"]);
+    assert_eq!(
+        found.diagnostics.iter().map(khz_frontend::diagnostics::Diagnostic::code).collect::<Vec<_>>(),
+        ["P0031"]
+    );
 }
