@@ -148,12 +148,10 @@ impl Program {
         self.verified.container()
     }
 
-    /// Names of its tasks, in declaration order; `task 3` (its identifier) where the container has no names.
+    /// Names of its tasks, in declaration order; `task 3` (its identifier) where one has none.
     #[must_use]
     pub fn task_names(&self) -> Vec<String> {
-        let names = self.container().debug.as_ref().map(|debug| debug.task_names.as_slice()).unwrap_or_default();
-        let tasks = self.container().tasks.tasks.iter().enumerate();
-        tasks.map(|(at, task)| names.get(at).cloned().unwrap_or_else(|| format!("task {}", task.id))).collect()
+        self.container().task_names()
     }
 
     /// Where the regions of its memory image lie.

@@ -109,8 +109,13 @@ fn a_stripped_container_behaves_the_same() {
     for path in [&full, &stripped] {
         let verified = khz().arg("verify").arg(path).output().unwrap();
         assert_eq!(verified.status.code(), Some(0), "{}", stderr(&verified));
-        let ran = khz().args(["run", "--clock", "virtual", "--scans", "3"]).arg(path).output().unwrap();
+        let stats = scratch.path("stats.json");
+        let ran =
+            khz().args(["run", "--clock", "virtual", "--scans", "3", "--stats"]).args([&stats, path]).output().unwrap();
         assert_eq!(ran.status.code(), Some(0), "{}", stderr(&ran));
+        assert!(stderr(&ran).contains("default_task: 3 scans"), "{}", stderr(&ran));
+        let stats: Value = serde_json::from_str(&std::fs::read_to_string(stats).unwrap()).unwrap();
+        assert_eq!(stats["tasks"][0]["name"], "default_task");
     }
 }
 

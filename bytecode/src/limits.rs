@@ -36,6 +36,8 @@ pub const MAX_SWITCH_TARGETS: u32 = 65_536;
 pub const MAX_STRING_LENGTH: u32 = 65_535;
 /// Places that a trap report keeps of the call chain, innermost first.
 pub const MAX_TRAP_CHAIN: usize = 16;
+/// Longest name of a task, in bytes of UTF-8.
+pub const MAX_TASK_NAME_BYTES: usize = 255;
 /// Shortest INTERVAL of a task, in microseconds.
 pub const MIN_INTERVAL_US: u64 = 1;
 /// Watchdog of initialisation and startup functions when none is given, in microseconds.

@@ -156,7 +156,7 @@ fn owner_names(container: &Container, position: usize) -> (Option<String>, Optio
     let debug = container.debug.as_ref();
     let Some(instance) = container.tasks.instances.get(position) else { return (None, None) };
     let task = container.tasks.tasks.iter().position(|task| task.id == instance.task);
-    let task_name = debug.and_then(|debug| debug.task_names.get(task?).cloned());
+    let task_name = task.and_then(|task| container.types.task_name(task)).map(str::to_string);
     let instance_name = debug.and_then(|debug| debug.instance_names.get(position).cloned());
     (
         Some(task_name.unwrap_or_else(|| format!("task {}", instance.task))),

@@ -2,7 +2,7 @@
 
 use khz_bytecode::container::{
     Container, DebugPlace, DebugSection, DebugType, DebugVariable, ElementaryType, InitRun, LineEntry, ProgramInstance,
-    Region, SourceFile, Task,
+    Region, SourceFile, Task, TaskExtension,
 };
 use khz_bytecode::ids::{FunctionId, InstanceId, SlotIndex, TaskId};
 use khz_bytecode::value::{BytePlace, Storage};
@@ -57,7 +57,6 @@ fn container() -> Container {
         function_names: vec!["Main".into(), "Sub".into(), "Other".into()],
         types,
         variables,
-        task_names: vec!["Fast".into()],
         instance_names: vec!["App".into()],
         ..DebugSection::default()
     };
@@ -70,6 +69,7 @@ fn container() -> Container {
     container.types.init_image =
         vec![InitRun { region: Region::Data, offset: 16, repeat: 2, bytes: vec![1, 0, 0xFE, 0xFF, 3, 0] }];
     container.tasks.tasks = vec![Task { id: TaskId(7), ..Task::default() }];
+    container.types.task_extensions = vec![TaskExtension { name: "Fast".into(), ..TaskExtension::default() }];
     container.tasks.instances =
         vec![ProgramInstance { id: InstanceId(9), task: TaskId(7), ..ProgramInstance::default() }];
     container
@@ -371,9 +371,12 @@ fn traps_are_reported_by_place_and_name() {
     }
     container.debug = None;
     let report = TrapReport::new(&trap, Entry::Instance(0), &container);
-    assert_eq!((report.task.as_deref(), report.instance.as_deref()), (Some("task 7"), Some("instance 9")));
+    assert_eq!((report.task.as_deref(), report.instance.as_deref()), (Some("Fast"), Some("instance 9")));
     assert!(report.to_string().contains("offset 12 in function 0"), "{report}");
     assert!(report.to_json().contains("\"file\":null,\"line\":null,\"column\":null,\"offset\":12,"));
+    container.types.task_extensions.clear();
+    let nameless = TrapReport::new(&trap, Entry::Instance(0), &container);
+    assert_eq!(nameless.task.as_deref(), Some("task 7"));
     let early = TrapReport::new(&Trap::new(TrapCode::Watchdog, place(0, 0), [0; 3]), Entry::Init, &container);
     assert!(
         early.to_json().contains("\"task\":null,\"instance\":null,") && early.to_json().ends_with("\"values\":{}}")

@@ -90,7 +90,7 @@ impl TaskSet {
         let mut by_id = BTreeMap::new();
         // The file's count is a u16, so no task is lost here.
         for (position, task) in container.tasks.tasks.iter().enumerate().take(usize::from(u16::MAX)) {
-            let extension = container.types.task_extensions.get(position).copied().unwrap_or_default();
+            let extension = container.types.task_extensions.get(position).cloned().unwrap_or_default();
             let single = single_source(task.single_slot, &extension);
             let trigger = match task.task_type {
                 TaskType::Cyclic => Trigger::Cyclic {

@@ -46,7 +46,6 @@ impl Assembler {
                 let place = self.debug_place(words)?;
                 debug.variables.push(DebugVariable { name, place, ty: words.number("debug type")? });
             }
-            "task" => debug.task_names.push(words.text("name")?.to_string()),
             "instance" => debug.instance_names.push(words.text("name")?.to_string()),
             other => return Err(words.error(format!("unknown line `{other}` in a debug block"))),
         }

@@ -42,7 +42,7 @@ impl Assembler {
                 while words.peek().is_some() {
                     if !self.extension_word(&mut extension, &mut words)? {
                         words.next("keyword")?;
-                        return Err(words.error("unknown word; known are single, phase, sensitivity, policy"));
+                        return Err(words.error("unknown word; known are name, single, phase, sensitivity, policy"));
                     }
                 }
                 self.container.types.task_extensions.push(extension);
@@ -369,7 +369,7 @@ impl Assembler {
 
     /// `task NAME cyclic US | event | freewheeling …`
     fn task_line(&mut self, words: &mut Words<'_>) -> Result<(), AssemblyError> {
-        words.next("name")?;
+        let name = words.word("name")?;
         let id = TaskId::from_index(self.container.tasks.tasks.len());
         let id = id.ok_or_else(|| words.error("there are too many tasks"))?;
         let mut task = Task { id, enabled: true, ..Task::default() };
@@ -379,7 +379,7 @@ impl Assembler {
             "freewheeling" => task.task_type = TaskType::Freewheeling,
             other => return Err(words.error(format!("`{other}` is neither cyclic, event nor freewheeling"))),
         }
-        let mut extension = TaskExtension::default();
+        let mut extension = TaskExtension { name: name.to_string(), ..TaskExtension::default() };
         while let Some(word) = words.peek() {
             if !self.exact && self.extension_word(&mut extension, words)? {
                 continue;
@@ -403,9 +403,11 @@ impl Assembler {
         Ok(())
     }
 
-    /// One of `single …`, `phase US`, `sensitivity N`, `policy NAME`, if that is what comes next.
+    /// One of `name "…"`, `single …`, `phase US`, `sensitivity N`, `policy NAME`, if that is what comes next.
     fn extension_word(&self, extension: &mut TaskExtension, words: &mut Words<'_>) -> Result<bool, AssemblyError> {
-        if words.take("single") {
+        if words.take("name") {
+            extension.name = words.text("name")?.to_string();
+        } else if words.take("single") {
             extension.single = self.single_source(words)?;
         } else if words.take("phase") {
             extension.phase_us = words.number("phase in µs")?;

@@ -11,6 +11,8 @@ use crate::limits::NULL_GUARD_BYTES;
 const DEFAULT_DEPTH: u16 = 64;
 /// Frame bytes of a text that names none.
 const DEFAULT_FRAME_BYTES: u32 = 4096;
+/// Name of the task of a text that names none, as the front end calls it.
+const DEFAULT_TASK: &str = "default_task";
 /// Interval of the task of a text that names none, as in the reference design's default configuration.
 const DEFAULT_INTERVAL_US: u64 = 10_000;
 
@@ -55,7 +57,7 @@ impl Assembler {
         if self.container.tasks.tasks.is_empty() {
             let task = Task { id: TaskId(0), enabled: true, interval_us: DEFAULT_INTERVAL_US, ..Task::default() };
             self.container.tasks.tasks.push(task);
-            self.extensions.push(TaskExtension::default());
+            self.extensions.push(TaskExtension { name: DEFAULT_TASK.into(), ..TaskExtension::default() });
         }
         let main = self.resolve(Kind::Function, "main").ok().and_then(|id| u16::try_from(id).ok());
         if let (true, Some(main)) = (self.instances.is_empty(), main) {

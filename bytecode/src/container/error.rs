@@ -81,5 +81,6 @@ read_codes! {
     ("C0019", SignatureForm, "a signature section has the wrong form", "A signature section holds a count of 1, algorithm 1 (Ed25519), a public key of 32 bytes and a signature of 64 bytes; a debug signature needs a debug section."),
     ("C0020", Signature, "a signature is wrong", "The Ed25519 signature does not belong to this content and key. A file with a wrong signature is refused even where unsigned files may run."),
     ("C0021", TooMany, "a list is longer than its section", "A count says more entries than the rest of the section has bytes."),
-    ("C0022", Text, "a name is not UTF-8", "Names in the debug section are UTF-8."),
+    ("C0022", Text, "a name is not UTF-8", "Names are UTF-8."),
+    ("C0023", TooLong, "a name is too long", "The name of a task has at most 255 bytes."),
 }

@@ -88,6 +88,27 @@ pub struct TypeSection {
     pub symbol_hashes: Vec<SymbolHash>,
 }
 
+impl Container {
+    /// What people call each task, in the order of the task table: its name, or `task ID` when it has none.
+    #[must_use]
+    pub fn task_names(&self) -> Vec<String> {
+        let tasks = self.tasks.tasks.iter().enumerate();
+        tasks
+            .map(|(position, task)| {
+                self.types.task_name(position).map_or_else(|| format!("task {}", task.id), str::to_string)
+            })
+            .collect()
+    }
+}
+
+impl TypeSection {
+    /// Name of the task at this position of the task table, if it has one.
+    #[must_use]
+    pub fn task_name(&self, position: usize) -> Option<&str> {
+        self.task_extensions.get(position).map(|extension| extension.name.as_str()).filter(|name| !name.is_empty())
+    }
+}
+
 /// How a value lies in byte-addressed memory.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Type {
@@ -268,8 +289,11 @@ pub enum OverrunPolicy {
 }
 
 /// What a task entry has no room for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct TaskExtension {
+    /// Its name as declared, at most [`MAX_TASK_NAME_BYTES`](crate::limits::MAX_TASK_NAME_BYTES) bytes. It stands here and not in the debug
+    /// section because statistics and reports of a stripped container name their tasks, too.
+    pub name: String,
     /// Its SINGLE source. A slot of an event task stands here and in the entry's `single_var_index`.
     pub single: SingleSource,
     /// Offset of its grid from the start, in microseconds.
@@ -469,8 +493,6 @@ pub struct DebugSection {
     pub types: Vec<DebugType>,
     /// Globals and program variables, in the order of a dump.
     pub variables: Vec<DebugVariable>,
-    /// One for each task, in order.
-    pub task_names: Vec<String>,
     /// One for each program instance, in order.
     pub instance_names: Vec<String>,
     /// Name of the RESOURCE.

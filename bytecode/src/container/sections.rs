@@ -5,6 +5,7 @@ use super::layout::{InstanceField, NONE, Record as Fixed, TaskField};
 use super::model::*;
 use super::wire::{Input, Shapes, Wire, wire_bytes, wire_choices, wire_ids, wire_structs, wire_tables};
 use crate::ids::{ArrayId, FunctionId, InstanceId, MethodId, ProgramId, SlotIndex, TaskId, TypeId};
+use crate::limits::MAX_TASK_NAME_BYTES;
 use crate::value::{BytePlace, IntegerType, LocalType, RefType, SlotPlace, Storage, ValueType};
 
 wire_ids! { ArrayId(u16) FunctionId(u16) MethodId(u16) ProgramId(u16) SlotIndex(u16) TypeId(u16) }
@@ -35,7 +36,13 @@ wire_structs! {
     MethodSignature { parameters: Vec<LocalType>, results: Vec<ValueType> }
     InitRun { region: Region, offset: u32, repeat: u32, bytes: Vec<u8> }
     RetainRange { region: Region, offset: u32, bytes: u32 }
-    TaskExtension { single: SingleSource, phase_us: u64, watchdog_sensitivity: u16, overrun_policy: OverrunPolicy }
+    TaskExtension {
+        name: String => MAX_TASK_NAME_BYTES,
+        single: SingleSource,
+        phase_us: u64,
+        watchdog_sensitivity: u16,
+        overrun_policy: OverrunPolicy,
+    }
     SystemVariable { kind: SystemVariableKind, slot: SlotIndex }
     SymbolHash { kind: u8, index: u32, hash: Hash }
     Function {
@@ -99,7 +106,7 @@ wire_tables! { TypeSection TYPE_TABLES put_type_tables get_type_tables {
     7 methods: MethodSignature = "Signatures of method names.";
     8 init_image: InitRun = "Initial values.";
     9 retain: RetainRange = "What a warm restart keeps.";
-    10 task_extensions: TaskExtension = "One for each task entry.";
+    10 task_extensions: TaskExtension = "One for each task entry. A name has at most 255 bytes.";
     11 system_variables: SystemVariable = "Slots that the scheduler writes.";
     12 symbol_hashes: SymbolHash = "Hashes of definitions, for online change.";
 } }
@@ -110,8 +117,7 @@ wire_tables! { DebugSection DEBUG_TABLES put_debug_tables get_debug_tables {
     3 function_names: String = "One for each function.";
     4 types: DebugType = "Types as the source declares them.";
     5 variables: DebugVariable = "Globals and program variables.";
-    6 task_names: String = "One for each task.";
-    7 instance_names: String = "One for each program instance.";
+    6 instance_names: String = "One for each program instance.";
 } }
 
 /// For documents.

@@ -230,6 +230,8 @@ fn each_rule_has_a_file_that_breaks_it() {
         at(HeaderField::ConstantOffset),
         at(HeaderField::DebugOffset),
     );
+    // Of the only task; its count of bytes stands before it.
+    let names = bytes.windows(12).position(|bytes| bytes == b"default_task").unwrap() - 4;
     for (code, at, new, seal) in [
         (ReadCode::Magic, 0, &b"\x7FELF"[..], false),
         (ReadCode::Version, 4, &[2], false),
@@ -252,6 +254,8 @@ fn each_rule_has_a_file_that_breaks_it() {
         (ReadCode::Reserved, tasks + 6 + 24, &[1], true),
         (ReadCode::Ends, tasks, &[9], true),
         (ReadCode::Rest, tasks + 2, &[0], true),
+        (ReadCode::TooLong, names, &[0, 1, 0, 0], true),
+        (ReadCode::TooMany, names, &[255, 0, 0, 0], true),
         (ReadCode::TooMany, constants, &[255, 255, 255, 255], true),
         (ReadCode::Value, constants + 4, &[3], true),
         (ReadCode::Text, debug + 4, &[0xFF], true),
@@ -260,6 +264,19 @@ fn each_rule_has_a_file_that_breaks_it() {
     }
     assert_eq!(read(&[]).unwrap_err().code, ReadCode::TooShort);
     assert_eq!(read(b"PROGRAM main\nEND_PROGRAM").unwrap_err().code, ReadCode::Magic);
+}
+
+#[test]
+fn tasks_have_names_without_a_debug_section_and_up_to_a_limit() {
+    let mut container = assemble("task fast cyclic 5\ntask b event name \"ß 2\"\nfunction main\n return\nend").unwrap();
+    assert_eq!(container.debug, None);
+    assert_eq!(read(&write(&container).unwrap()).unwrap().task_names(), ["fast", "ß 2"]);
+    container.types.task_extensions[1].name = "ß".repeat(127) + "x";
+    assert_eq!(read(&write(&container).unwrap()).as_ref(), Ok(&container));
+    container.types.task_extensions[1].name.push('x');
+    assert_eq!(write(&container).unwrap_err().message, "a name of 256 bytes; 255 is the limit");
+    container.types.task_extensions[1].name.clear();
+    assert_eq!(container.task_names(), ["fast", "task 1"]);
 }
 
 /// A wrong hash behind a right content hash.

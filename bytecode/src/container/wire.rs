@@ -242,23 +242,47 @@ macro_rules! wire_ids {
     )* };
 }
 
-/// Fields in their order.
+/// Fields in their order; behind `=>` stands how many entries or bytes a list or text may have.
 macro_rules! wire_structs {
-    ($($ty:ident { $($field:ident: $kind:ty),* $(,)? })*) => {
+    ($($ty:ident { $($field:ident: $kind:ty $(=> $limit:ident)?),* $(,)? })*) => {
         pub(super) const STRUCTS: &[(&str, super::wire::FieldShapes)] = &[$((stringify!($ty), &[$((stringify!($field), stringify!($kind))),*])),*];
         $(
             impl Wire for $ty {
                 fn put(&self, out: &mut Vec<u8>) -> Result<(), WriteError> {
-                    $(self.$field.put(out)?;)*
+                    $(
+                        $(super::wire::put_limit(stringify!($field), self.$field.len(), $limit)?;)?
+                        self.$field.put(out)?;
+                    )*
                     Ok(())
                 }
 
                 fn get(input: &mut Input<'_>) -> Result<Self, ReadError> {
-                    Ok($ty { $($field: <$kind>::get(input)?),* })
+                    $(
+                        $(super::wire::get_limit(stringify!($field), $limit, input)?;)?
+                        let $field = <$kind>::get(input)?;
+                    )*
+                    Ok($ty { $($field),* })
                 }
             }
         )*
     };
+}
+
+/// A list or text of `length` that may have `limit`.
+pub(super) fn put_limit(field: &str, length: usize, limit: usize) -> Result<(), WriteError> {
+    if length > limit {
+        return Err(WriteError::new(format!("a {field} of {length} bytes; {limit} is the limit")));
+    }
+    Ok(())
+}
+
+/// Looks at the count of the list or text that comes next.
+pub(super) fn get_limit(field: &str, limit: usize, input: &Input<'_>) -> Result<(), ReadError> {
+    let count = u32::get(&mut input.clone())? as usize;
+    if count > limit {
+        return Err(input.error(ReadCode::TooLong, format!("a {field} of {count} bytes; {limit} is the limit")));
+    }
+    Ok(())
 }
 
 /// A number, then the fields of what it stands for.

@@ -11,7 +11,7 @@ pub(super) fn write(debug: &DebugSection, out: &mut String) {
     for file in &debug.files {
         push(out, format_args!("  file {} {}\n", quote(&file.name), to_hex(&file.hash)));
     }
-    let names = [("function", &debug.function_names), ("task", &debug.task_names), ("instance", &debug.instance_names)];
+    let names = [("function", &debug.function_names), ("instance", &debug.instance_names)];
     for (keyword, names) in names {
         for name in names {
             push(out, format_args!("  {keyword} {}\n", quote(name)));

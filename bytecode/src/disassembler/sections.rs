@@ -1,7 +1,7 @@
 //! Everything but functions and debug information.
 
 use super::{local_type, push};
-use crate::assembler::to_hex;
+use crate::assembler::{quote, to_hex};
 use crate::container::{
     Constant, Container, OverrunPolicy, Record, Region, SingleSource, SystemVariableKind, Task, TaskExtension,
     TaskType, Type, TypeSection,
@@ -191,7 +191,15 @@ fn task_line(task: &Task, out: &mut String) {
 }
 
 fn extension_line(task: &TaskExtension, out: &mut String) {
-    push(out, format_args!("extension phase {} sensitivity {}", task.phase_us, task.watchdog_sensitivity));
+    push(
+        out,
+        format_args!(
+            "extension name {} phase {} sensitivity {}",
+            quote(&task.name),
+            task.phase_us,
+            task.watchdog_sensitivity
+        ),
+    );
     out.push_str(match task.overrun_policy {
         OverrunPolicy::Grid => " policy grid",
         OverrunPolicy::AtOnce => " policy at-once",

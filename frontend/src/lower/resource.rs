@@ -7,7 +7,7 @@ use khz_bytecode::container::{
     Region, RetainRange, SingleSource, SourceFile, Task, TaskExtension, TaskTable, TaskType,
 };
 use khz_bytecode::ids::{FunctionId, InstanceId, SlotIndex, TaskId};
-use khz_bytecode::limits::{FRAME_ALIGN_BYTES, MAX_CALL_DEPTH, MAX_STACK_DEPTH, SLOT_BYTES};
+use khz_bytecode::limits::{FRAME_ALIGN_BYTES, MAX_CALL_DEPTH, MAX_STACK_DEPTH, MAX_TASK_NAME_BYTES, SLOT_BYTES};
 use khz_bytecode::value::{BytePlace, SlotPlace};
 
 use super::layout::DebugTypes;
@@ -44,8 +44,9 @@ impl Builder<'_> {
         let startup_function = plan.startup.and_then(|pou| self.info(pou).map(|info| self.lower_startup(pou, &info)));
         self.initial_values(&bases);
         self.retained(&bases);
-        let tasks = plan.tasks.iter().enumerate().map(|(at, task)| self.task(at, task, &bases)).collect::<Vec<_>>();
-        self.section.task_extensions = tasks.iter().map(|(_, extension)| *extension).collect();
+        let tasks = plan.tasks.iter().enumerate().map(|(at, task)| self.task(at, task, &bases));
+        let (tasks, extensions) = tasks.collect();
+        self.section.task_extensions = extensions;
         let debug = self.debug(sources, hashes, &bases);
         let parameters = self.parameters(&instances, startup_function);
         Container {
@@ -54,7 +55,7 @@ impl Builder<'_> {
             content_signature: Vec::new(),
             debug_signature: Vec::new(),
             types: std::mem::take(&mut self.section),
-            tasks: TaskTable { shared_globals, tasks: tasks.into_iter().map(|(task, _)| task).collect(), instances },
+            tasks: TaskTable { shared_globals, tasks, instances },
             constants: std::mem::take(&mut self.constants),
             functions: std::mem::take(&mut self.functions),
             debug: Some(debug),
@@ -306,7 +307,11 @@ impl Builder<'_> {
             single_slot,
             watchdog_us: plan.watchdog_us,
         };
+        if plan.name.len() > MAX_TASK_NAME_BYTES {
+            self.fail("bytes of a TASK's name");
+        }
         let extension = TaskExtension {
+            name: plan.name.clone(),
             single,
             phase_us: plan.phase_us,
             watchdog_sensitivity: plan.watchdog_sensitivity,
@@ -395,7 +400,6 @@ impl Builder<'_> {
             function_names: self.function_names.clone(),
             types: types.list,
             variables,
-            task_names: plan.tasks.iter().map(|task| task.name.clone()).collect(),
             instance_names: plan.instances.iter().map(|instance| instance.name.clone()).collect(),
             resource_name: plan.name.clone(),
             configuration_name: plan.configuration.clone(),

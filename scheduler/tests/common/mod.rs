@@ -103,7 +103,7 @@ pub fn container(tasks: &[(Task, TaskExtension)]) -> Container {
         // Ids are names, not positions.
         let id = TaskId(100 + position as u16);
         container.tasks.tasks.push(Task { id, ..*task });
-        container.types.task_extensions.push(*extension);
+        container.types.task_extensions.push(extension.clone());
         container.tasks.instances.push(ProgramInstance {
             id: InstanceId(position as u16),
             task: id,

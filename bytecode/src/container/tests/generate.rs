@@ -135,6 +135,7 @@ fn type_section(r: &mut Random) -> TypeSection {
 
 fn extension(r: &mut Random) -> TaskExtension {
     TaskExtension {
+        name: r.text(),
         single: match r.below(5) {
             0 => SingleSource::None,
             1 => SingleSource::Slot(SlotIndex(r.u16())),
@@ -242,7 +243,6 @@ fn debug(r: &mut Random) -> DebugSection {
             },
             ty: r.u16(),
         }),
-        task_names: r.list(Random::text),
         instance_names: r.list(Random::text),
         resource_name: r.text(),
         configuration_name: r.text(),
