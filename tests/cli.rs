@@ -12,9 +12,9 @@ PROGRAM Main
 VAR
   flag : BOOL := TRUE; small : SINT := -5; big : ULINT := 18446744073709551615; r : REAL := 0.1; nan : LREAL; inf : LREAL; zero : LREAL;
   t : TIME := T#1s500ms; s : STRING[20] := 'a\"b'; colour : Colour := Blue; list : ARRAY[0..2] OF INT := [1, 2, 3]; p : Point; c : Count;
-  grid : ARRAY[0..1, 0..1] OF BOOL; input AT %IW0 : WORD; seen : WORD;
-END_VAR
-  nan := zero / zero; inf := -1.0 / zero; c(up := flag); seen := input;
+  grid : ARRAY[0..1, 0..1] OF BOOL; input AT %IW0 : WORD; seen : WORD; step : INT (-1..5) := 2; far : ULINT (3..16#FFFF_FFFF_FFFF_FFFF) := 3;
+END_VAR VAR CONSTANT fixed : ARRAY[0..1] OF INT := [4, 5]; END_VAR
+  nan := zero / zero; inf := -1.0 / zero; c(up := flag); seen := input; list[2] := fixed[0] - 1;
 END_PROGRAM
 VAR_GLOBAL total : DINT := 7; END_VAR
 ";
@@ -54,6 +54,7 @@ fn a_dump_has_every_variable_as_the_page_says() {
     assert_eq!(v["Main.p"], serde_json::json!({ "x": 3, "y": 0.1 }));
     assert_eq!(v["Main.c"]["n"], 2);
     assert_eq!(v["Main.grid"], serde_json::json!([[false, false], [false, false]]));
+    assert_eq!((&v["Main.step"], &v["Main.far"], &v["Main.fixed"][1]), (&2.into(), &3.into(), &5.into()));
     assert_eq!(v["total"], 7);
 }
 
@@ -75,9 +76,13 @@ fn wrong_values_are_refused_with_their_place() {
     let rows = scratch.write("rows.csv", "time_us,main.small\n0,5\n10,500\n");
     let order = scratch.write("order.csv", "time_us,main.small\n10,5\n0,5\n");
     let header = scratch.write("header.csv", "time,main.small\n10,5\n");
-    let cases: [(&[&str], &str, i32); 6] = [
+    let cases: [(&[&str], &str, i32); 10] = [
         (&["--set", "main.nothing=1"], "main.nothing", 1),
         (&["--set", "main.small=1000"], "main.small", 1),
+        (&["--set", "main.step=6"], "`Main.step` is INT (-1..5): 6 is outside -1 to 5", 1),
+        (&["--set", "main.far=2"], "2 is outside 3 to 18446744073709551615", 1),
+        (&["--set", "main.colour=3"], "`Main.colour` is Colour: `3` is none of its values (Red, Green, Blue)", 1),
+        (&["--set", "main.fixed[0]=1"], "`Main.fixed[0]` is a CONSTANT", 1),
         (&["--set", "main.small"], "NAME=VALUE", 2),
         (&["--inputs", rows.to_str().unwrap()], "rows.csv:3", 1),
         (&["--inputs", order.to_str().unwrap()], "order.csv:3", 1),

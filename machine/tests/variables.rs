@@ -27,25 +27,23 @@ fn container() -> Container {
     types.push(DebugType::Record { name: "Motor".into(), fields });
     types.push(DebugType::String { capacity: 5 });
     types.push(DebugType::WideString { capacity: 3 });
-    let data = |name: &str, offset, ty| DebugVariable {
-        name: name.into(),
-        place: DebugPlace::Bytes(BytePlace::Data, offset),
-        ty,
-    };
+    let at = |name: &str, place, ty| DebugVariable { name: name.into(), place, ty, constant: false };
+    let data = |name: &str, offset, ty| at(name, DebugPlace::Bytes(BytePlace::Data, offset), ty);
     let mut variables = vec![
-        DebugVariable { name: "Count".into(), place: DebugPlace::Slot(SlotIndex(1)), ty: id(ElementaryType::Uint) },
+        at("Count", DebugPlace::Slot(SlotIndex(1)), id(ElementaryType::Uint)),
         data("App.A", 16, first),
         data("App.S", 32, first + 2),
         data("App.Text", 48, first + 3),
         data("App.Wide", 56, first + 4),
-        DebugVariable {
-            name: "Lamp".into(),
-            place: DebugPlace::Bit(BytePlace::Output, 1, 3),
-            ty: id(ElementaryType::Bool),
-        },
+        at("Lamp", DebugPlace::Bit(BytePlace::Output, 1, 3), id(ElementaryType::Bool)),
     ];
-    for (at, ty) in ElementaryType::ALL.iter().enumerate() {
-        variables.push(data(&format!("all.{}", ty.name()), 64 + 8 * at as u32, id(*ty)));
+    types.push(DebugType::Subrange { base: ElementaryType::Int, lower: -2, upper: 5 });
+    types.push(DebugType::Subrange { base: ElementaryType::Ulint, lower: i64::MAX, upper: -1 });
+    types.push(DebugType::Array { element: first + 5, stride: 2, dimensions: vec![(1, 3)] });
+    variables.extend([data("Step", 400, first + 5), data("High", 408, first + 6)]);
+    variables.push(DebugVariable { constant: true, ..data("Fixed", 416, first + 7) });
+    for (position, ty) in ElementaryType::ALL.iter().enumerate() {
+        variables.push(data(&format!("all.{}", ty.name()), 64 + 8 * position as u32, id(*ty)));
     }
     let debug = DebugSection {
         files: vec![SourceFile { name: "plant.st".into(), hash: [0; 32] }],
@@ -182,7 +180,12 @@ fn literals_enter_and_read_back() {
         ("app.s.state", "green", "Green"),
         ("app.s.state", "COLOR#RED", "Red"),
         ("app.s.state", "color.green", "Green"),
-        ("app.s.state", "17", "17"),
+        ("app.s.state", "-5", "Green"),
+        ("app.s.state", "COLOR#0", "Red"),
+        ("step", " -2", "-2"),
+        ("step", "INT#16#5", "5"),
+        ("high", "18446744073709551615", "18446744073709551615"),
+        ("high", "9223372036854775807", "9223372036854775807"),
         ("app.text", "'a$'b$0A'", "'a$'b$0A'"),
         ("app.text", "'ü'", "'$FC'"),
         ("app.text", "''", "''"),
@@ -221,6 +224,17 @@ fn wrong_literals_name_the_variable() {
         ("all.tod", "D#2024-01-01", "`all.TOD` is TOD: `D#2024-01-01` is not such a moment, for example TOD#12:34:56"),
         ("all.char", "'xy'", "`all.CHAR` is CHAR: 2 characters where one is wanted"),
         ("app.s.state", "Blue", "`App.S.State` is Color: `Blue` is none of its values (Red, Green)"),
+        ("app.s.state", "17", "`App.S.State` is Color: `17` is none of its values (Red, Green)"),
+        ("app.s.state", "5", "`App.S.State` is Color: `5` is none of its values (Red, Green)"),
+        ("step", "6", "`Step` is INT (-2..5): 6 is outside -2 to 5"),
+        ("step", "-3", "`Step` is INT (-2..5): -3 is outside -2 to 5"),
+        ("step", "x", "`Step` is INT (-2..5): `x` is not a whole number"),
+        (
+            "high",
+            "5",
+            "`High` is ULINT (9223372036854775807..18446744073709551615): 5 is outside 9223372036854775807 to 18446744073709551615",
+        ),
+        ("fixed[2]", "3", "`Fixed[2]` is a CONSTANT and can not be written"),
         ("app.text", "'123456'", "`App.Text` is STRING[5]: 6 characters are more than it can hold"),
         ("app.text", "abc", "`App.Text` is STRING[5]: a character string stands between two '"),
         ("app.text", "'€'", "`App.Text` is STRING[5]: STRING has no character `€` (Latin-1)"),
@@ -274,7 +288,7 @@ fn dumps() {
     let json = table.dump_json(&image, 1000, 2);
     let start = "{\"time_us\":1000,\"rounds\":2,\"variables\":{\"Count\":0,\"App.A\":[[1,-2,3],[1,-2,3]],\
         \"App.S\":{\"Speed\":0.0,\"State\":\"Green\"},\"App.Text\":\"q\\\"ü\\u0001\",\"App.Wide\":\"\\ud800x\",\"Lamp\":false,\
-        \"all.BOOL\":true,\"all.SINT\":0,";
+        \"Step\":0,\"High\":0,\"Fixed\":[0,0,0],\"all.BOOL\":true,\"all.SINT\":0,";
     assert!(json.starts_with(start), "{json}");
     assert!(json.contains("\"all.ULINT\":18446744073709551615,"), "{json}");
     assert!(json.contains("\"all.REAL\":\"NaN\",\"all.LREAL\":0.1,\"all.TIME\":\"T#0ms\","), "{json}");
@@ -284,7 +298,7 @@ fn dumps() {
     let lines: Vec<_> = text.lines().collect();
     assert_eq!(lines[0], "App.A := [[1, -2, 3], [1, -2, 3]]");
     assert_eq!(lines[1], "App.S := (Speed := 0.0, State := Green)");
-    assert!(lines.is_sorted() && lines.len() == 6 + ElementaryType::ALL.len());
+    assert!(lines.is_sorted() && lines.len() == 9 + ElementaryType::ALL.len());
     let leaves = table.leaves(&table.resolve("app.a").unwrap(), 4);
     let names: Vec<_> = leaves.iter().map(|leaf| leaf.name.as_str()).collect();
     assert_eq!(names, ["App.A[1,-1]", "App.A[1,0]", "App.A[1,1]", "App.A[2,-1]"]);
@@ -319,8 +333,10 @@ fn a_hostile_debug_section_costs_little() {
     ];
     let types = [0, 1, 50, 100, empty, empty + 1, empty + 2, empty + 3, empty + 4, empty + 5, u16::MAX];
     let pairs = types.iter().flat_map(|ty| places.iter().map(move |place| (*ty, *place)));
-    debug.variables =
-        pairs.enumerate().map(|(at, (ty, place))| DebugVariable { name: format!("v{at}"), place, ty }).collect();
+    debug.variables = pairs
+        .enumerate()
+        .map(|(at, (ty, place))| DebugVariable { name: format!("v{at}"), place, ty, constant: false })
+        .collect();
     let (table, mut image) = (VariableTable::of(&container), image(&container));
     assert!(table.dump_json(&image, 0, 0).len() < 20 << 20);
     assert!(table.dump_text(&image).len() < 20 << 20);

@@ -44,7 +44,8 @@ impl Assembler {
             "variable" => {
                 let name = words.text("name")?.to_string();
                 let place = self.debug_place(words)?;
-                debug.variables.push(DebugVariable { name, place, ty: words.number("debug type")? });
+                let ty = words.number("debug type")?;
+                debug.variables.push(DebugVariable { name, place, ty, constant: words.take("constant") });
             }
             "instance" => debug.instance_names.push(words.text("name")?.to_string()),
             other => return Err(words.error(format!("unknown line `{other}` in a debug block"))),
@@ -88,6 +89,11 @@ fn debug_type(words: &mut Words<'_>) -> Result<DebugType, AssemblyError> {
             }
             DebugType::Array { element, stride, dimensions }
         }
+        "subrange" => DebugType::Subrange {
+            base: elementary(words)?,
+            lower: words.number("least value")?,
+            upper: words.number("greatest value")?,
+        },
         "enumeration" => {
             let name = words.text("name")?.to_string();
             let base = elementary(words)?;

@@ -542,6 +542,15 @@ pub enum DebugType {
         /// Names and values.
         values: Vec<(String, i64)>,
     },
+    /// A part of an integer type (clause 6.4.4.4), lower <= upper.
+    Subrange {
+        /// The integer type.
+        base: ElementaryType,
+        /// Least value; of an unsigned type the bits of its number.
+        lower: i64,
+        /// Greatest value; of an unsigned type the bits of its number.
+        upper: i64,
+    },
     /// `STRING[capacity]`.
     String {
         /// Characters.
@@ -590,6 +599,8 @@ pub struct DebugVariable {
     pub place: DebugPlace,
     /// Its type.
     pub ty: DebugTypeId,
+    /// Whether it was declared CONSTANT.
+    pub constant: bool,
 }
 
 macro_rules! elementary_types {

@@ -57,7 +57,7 @@ wire_structs! {
     ForLoop { control: ControlPlace, ty: IntegerType, bound: SlotIndex, step: SlotIndex }
     SourceFile { name: String, hash: Hash }
     LineEntry { function: FunctionId, offset: u32, file: u16, line: u32, column: u32 }
-    DebugVariable { name: String, place: DebugPlace, ty: DebugTypeId }
+    DebugVariable { name: String, place: DebugPlace, ty: DebugTypeId, constant: bool }
 }
 
 wire_choices! {
@@ -88,6 +88,7 @@ wire_choices! {
         3 WideString { capacity: u16 },
         4 Array { element: DebugTypeId, stride: u32, dimensions: Vec<(i32, i32)> },
         5 Record { name: String, fields: Vec<(String, u32, DebugTypeId)> },
+        6 Subrange { base: ElementaryType, lower: i64, upper: i64 },
     }
     DebugPlace {
         0 Slot(slot: SlotIndex),

@@ -26,7 +26,8 @@ pub(super) fn write(debug: &DebugSection, out: &mut String) {
             DebugPlace::Bytes(place, offset) => format!("bytes {place} {offset}"),
             DebugPlace::Bit(place, offset, bit) => format!("bit {place} {offset} {bit}"),
         };
-        push(out, format_args!("  variable {} {place} {}\n", quote(&variable.name), variable.ty));
+        let constant = if variable.constant { " constant" } else { "" };
+        push(out, format_args!("  variable {} {place} {}{constant}\n", quote(&variable.name), variable.ty));
     }
     for l in &debug.lines {
         push(out, format_args!("  line {} {} {} {} {}\n", l.function, l.offset, l.file, l.line, l.column));
@@ -43,6 +44,9 @@ fn debug_type(ty: &DebugType, out: &mut String) {
             for (name, value) in values {
                 push(out, format_args!(" {} {value}", quote(name)));
             }
+        }
+        DebugType::Subrange { base, lower, upper } => {
+            push(out, format_args!("subrange {} {lower} {upper}", base.name()));
         }
         DebugType::String { capacity } => push(out, format_args!("string {capacity}")),
         DebugType::WideString { capacity } => push(out, format_args!("wstring {capacity}")),

@@ -209,6 +209,7 @@ impl Builder<'_> {
                 base: *base,
                 values: values.iter().map(|(_, name, value)| (name.clone(), *value)).collect(),
             },
+            (_, Some(&TyKind::Subrange { base, low, high })) => DebugType::Subrange { base, lower: low, upper: high },
             (_, Some(TyKind::Array { element, dims })) => DebugType::Array {
                 element: self.debug_type(debug, *element),
                 stride: project.types.extent(*element).0,

@@ -408,16 +408,16 @@ impl Builder<'_> {
 
     fn debug_variables(&mut self, types: &mut DebugTypes, bases: &[Base]) -> Vec<DebugVariable> {
         let project = self.project;
-        let mut found: Vec<(String, Home, Ty)> = Vec::new();
+        let mut found: Vec<(String, Home, Ty, bool)> = Vec::new();
         self.each_variable(bases, |instance, at, home| match instance {
             None => {
                 if let Some(global) = project.globals.get(at) {
-                    found.push((global.name.clone(), home, global.ty));
+                    found.push((global.name.clone(), home, global.ty, global.constant));
                 }
             }
             Some((instance, info, at)) => {
                 if let Some(var) = info.vars.get(at).filter(|var| is_dumped(var.class)) {
-                    found.push((format!("{}.{}", instance.name, var.name), home, var.ty));
+                    found.push((format!("{}.{}", instance.name, var.name), home, var.ty, var.constant));
                 }
             }
         });
@@ -427,11 +427,12 @@ impl Builder<'_> {
         {
             if used == Some(true) {
                 use khz_bytecode::container::ElementaryType as E;
-                found.push((name.to_owned(), self.system_home(long), Ty::Elem(if long { E::Ltime } else { E::Time })));
+                let ty = Ty::Elem(if long { E::Ltime } else { E::Time });
+                found.push((name.to_owned(), self.system_home(long), ty, false));
             }
         }
         let mut list = Vec::with_capacity(found.len());
-        for (name, home, ty) in found {
+        for (name, home, ty, constant) in found {
             let place = match home {
                 Home::Slot(_, slot) => DebugPlace::Slot(slot),
                 Home::Bytes(place, offset) => DebugPlace::Bytes(place, offset),
@@ -439,7 +440,7 @@ impl Builder<'_> {
                 Home::Ref(_) | Home::None => continue,
             };
             let ty = self.debug_type(types, ty);
-            list.push(DebugVariable { name, place, ty });
+            list.push(DebugVariable { name, place, ty, constant });
         }
         list
     }

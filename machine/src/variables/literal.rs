@@ -3,7 +3,7 @@
 use khz_bytecode::container::ElementaryType;
 
 use super::calendar::{parse_date, parse_date_and_time, parse_time_of_day};
-use super::scalar::time_prefix;
+use super::scalar::{VariableValue, time_prefix};
 use crate::semantics::Value;
 use crate::semantics::parse::{parse_integer, parse_real, parse_time};
 
@@ -121,7 +121,29 @@ fn single(units: &[u16]) -> Result<Value, Reason> {
     }
 }
 
-/// Reads the value of an enumeration: a name, with or without the type's name and `#` or `.`, or a number of the base type.
+/// Reads a whole number of the type `base` from `lower` to `upper`; these are bits of the base type.
+pub(super) fn parse_subrange(base: ElementaryType, lower: i64, upper: i64, literal: &str) -> Result<Value, Reason> {
+    let value = parse_elementary(base, literal)?;
+    let is_inside = match VariableValue::from_loaded(base, value) {
+        VariableValue::Signed(number) => (lower..=upper).contains(&number),
+        VariableValue::Unsigned(number) => (lower as u64..=upper as u64).contains(&number),
+        _ => false,
+    };
+    if !is_inside {
+        let (literal, lower, upper) = (literal.trim(), bound_text(base, lower), bound_text(base, upper));
+        return Err(format!("{literal} is outside {lower} to {upper}"));
+    }
+    Ok(value)
+}
+
+/// A bound of a subrange as a number of its base type.
+pub(super) fn bound_text(base: ElementaryType, bits: i64) -> String {
+    let mut text = String::new();
+    VariableValue::from_loaded(base, Value::I64(bits)).write_text(&mut text);
+    text
+}
+
+/// Reads the value of an enumeration: a name, with or without the type's name and `#` or `.`, or the number of one of its values.
 pub(super) fn parse_enumeration(
     name: &str,
     base: ElementaryType,
@@ -134,7 +156,11 @@ pub(super) fn parse_enumeration(
     if let Some((_, value)) = values.iter().find(|(name, _)| name.eq_ignore_ascii_case(wanted)) {
         return Ok(Value::from_bits(base.storage().value_type(), *value as u64));
     }
-    parse_elementary(base, wanted).map_err(|_| {
+    let is_known = |value: &Value| {
+        let number = VariableValue::from_loaded(base, *value).whole_bits();
+        values.iter().any(|(_, known)| Some(*known) == number)
+    };
+    parse_elementary(base, wanted).ok().filter(is_known).ok_or_else(|| {
         let known: Vec<_> = values.iter().map(|(name, _)| name.as_str()).take(MAX_NAMES_SHOWN).collect();
         format!("`{wanted}` is none of its values ({})", known.join(", "))
     })

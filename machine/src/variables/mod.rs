@@ -44,6 +44,8 @@ pub struct Variable {
     pub place: DebugPlace,
     /// Its type.
     pub ty: VariableType,
+    /// Whether it is, or lies in, what was declared CONSTANT: it can be read only.
+    pub constant: bool,
 }
 
 /// Why a variable could not be found, read or written. Each names the variable.
@@ -98,6 +100,9 @@ pub enum VariableError {
         /// `an array` or `a structure`.
         what: &'static str,
     },
+    /// What was declared CONSTANT keeps its value.
+    #[error("`{0}` is a CONSTANT and can not be written")]
+    Constant(String),
     /// A text that is no value of the variable's type.
     #[error("`{name}` is {ty}: {reason}")]
     Literal {
@@ -127,6 +132,7 @@ pub struct VariableTable {
 pub(crate) enum Shape<'t> {
     Scalar(ElementaryType),
     Enumeration { name: &'t str, base: ElementaryType, values: &'t [(String, i64)] },
+    Subrange { base: ElementaryType, lower: i64, upper: i64 },
     String { capacity: u16 },
     WideString { capacity: u16 },
     Array { element: DebugTypeId, stride: u32, dimensions: &'t [(i32, i32)] },
@@ -161,6 +167,7 @@ impl VariableTable {
             name: variable.name.clone(),
             place: variable.place,
             ty: VariableType::Declared(variable.ty),
+            constant: variable.constant,
         })
     }
 
@@ -172,6 +179,7 @@ impl VariableTable {
         match self.types.get(usize::from(id)) {
             Some(DebugType::Elementary(ty)) => Shape::Scalar(*ty),
             Some(DebugType::Enumeration { name, base, values }) => Shape::Enumeration { name, base: *base, values },
+            Some(&DebugType::Subrange { base, lower, upper }) => Shape::Subrange { base, lower, upper },
             Some(DebugType::String { capacity }) => Shape::String { capacity: *capacity },
             Some(DebugType::WideString { capacity }) => Shape::WideString { capacity: *capacity },
             Some(DebugType::Array { element, stride, dimensions }) => {
@@ -188,6 +196,10 @@ impl VariableTable {
         match self.shape(variable.ty) {
             Shape::Scalar(ty) => ty.name().to_string(),
             Shape::Enumeration { name, .. } | Shape::Record { name, .. } => name.to_string(),
+            Shape::Subrange { base, lower, upper } => {
+                let [lower, upper] = [lower, upper].map(|bound| literal::bound_text(base, bound));
+                format!("{} ({lower}..{upper})", base.name())
+            }
             Shape::String { capacity } => format!("STRING[{capacity}]"),
             Shape::WideString { capacity } => format!("WSTRING[{capacity}]"),
             Shape::Array { dimensions, .. } => {
@@ -225,14 +237,12 @@ impl VariableTable {
         }
         let bytes = bytes_at(image, place)?;
         match self.shape(ty) {
-            Shape::Scalar(ty) => Some(VariableValue::from_loaded(ty, load(bytes, ty)?)),
+            Shape::Scalar(ty) | Shape::Subrange { base: ty, .. } => {
+                Some(VariableValue::from_loaded(ty, load(bytes, ty)?))
+            }
             Shape::Enumeration { base, values, .. } => {
                 let value = VariableValue::from_loaded(base, load(bytes, base)?);
-                let number = match value {
-                    VariableValue::Signed(number) => Some(number),
-                    VariableValue::Unsigned(number) => Some(number as i64),
-                    _ => None,
-                };
+                let number = value.whole_bits();
                 let named = values.iter().find(|(_, value)| Some(*value) == number);
                 Some(named.map_or(value, |(name, _)| VariableValue::Named(name.clone())))
             }
@@ -250,16 +260,19 @@ impl VariableTable {
         }
     }
 
-    /// Writes an IEC literal to a variable that is no array or structure. BOOL also takes 0 and 1; enumerations take names and numbers.
-    /// A NaN enters as the one NaN.
+    /// Writes an IEC literal to a variable that is no array or structure. BOOL also takes 0 and 1; enumerations take names and numbers of
+    /// their values. A NaN enters as the one NaN.
     ///
     /// # Errors
-    /// No value of the variable's type, one outside its range, or a string longer than its capacity; nothing is written then.
+    /// A CONSTANT, no value of the variable's type, one outside its range or subrange, or a string longer than its capacity; nothing is written then.
     pub fn write(&self, image: &mut Image, variable: &Variable, literal: &str) -> Result<(), VariableError> {
         let name = || variable.name.clone();
         let wrong = |reason| VariableError::Literal { name: name(), ty: self.type_name(variable), reason };
         if let Some(what) = self.aggregate(variable.ty) {
             return Err(VariableError::NotScalar { name: name(), what });
+        }
+        if variable.constant {
+            return Err(VariableError::Constant(name()));
         }
         let outside = || VariableError::Outside(name());
         let range = place_range(image.layout(), variable.place).ok_or_else(outside)?;
@@ -267,18 +280,15 @@ impl VariableTable {
         match self.shape(variable.ty) {
             Shape::Scalar(ty) => {
                 let value = literal::parse_elementary(ty, literal).map_err(wrong)?;
-                match variable.place {
-                    DebugPlace::Bit(_, _, bit) => {
-                        let byte = bytes.first_mut().ok_or_else(outside)?;
-                        *byte = *byte & !(1 << (bit & 7)) | u8::from(value.bits() != 0) << (bit & 7);
-                        Ok(())
-                    }
-                    _ => store(bytes, ty, value).ok_or_else(outside),
-                }
+                store_at(bytes, variable.place, ty, value).ok_or_else(outside)
+            }
+            Shape::Subrange { base, lower, upper } => {
+                let value = literal::parse_subrange(base, lower, upper, literal).map_err(wrong)?;
+                store_at(bytes, variable.place, base, value).ok_or_else(outside)
             }
             Shape::Enumeration { name, base, values } => {
                 let value = literal::parse_enumeration(name, base, values, literal).map_err(wrong)?;
-                store(bytes, base, value).ok_or_else(outside)
+                store_at(bytes, variable.place, base, value).ok_or_else(outside)
             }
             Shape::String { capacity } => {
                 let units = string_units(literal, '\'', capacity).map_err(wrong)?;
@@ -321,7 +331,13 @@ fn load(bytes: &[u8], ty: ElementaryType) -> Option<Value> {
     bytes.get(..storage.bytes() as usize).map(|bytes| load_foreign_scalar(bytes, storage))
 }
 
-fn store(bytes: &mut [u8], ty: ElementaryType, value: Value) -> Option<()> {
+/// Stores a scalar at the start of `bytes`: into its one bit if the place is one.
+fn store_at(bytes: &mut [u8], place: DebugPlace, ty: ElementaryType, value: Value) -> Option<()> {
+    if let DebugPlace::Bit(_, _, bit) = place {
+        let byte = bytes.first_mut()?;
+        *byte = *byte & !(1 << (bit & 7)) | u8::from(value.bits() != 0) << (bit & 7);
+        return Some(());
+    }
     let storage = ty.storage();
     bytes.get_mut(..storage.bytes() as usize).map(|bytes| store_scalar(bytes, storage, value))
 }

@@ -15,7 +15,7 @@ impl Variable {
         let mut name = self.name.clone();
         // Writing to a String does not fail.
         let _ = name.write_fmt(suffix);
-        Some(Variable { name, place, ty: VariableType::Declared(ty) })
+        Some(Variable { name, place, ty: VariableType::Declared(ty), constant: self.constant })
     }
 }
 
@@ -44,7 +44,8 @@ impl VariableTable {
         if path.starts_with('%') {
             let address = DirectAddress::parse(path).ok_or_else(|| VariableError::Address(path.to_string()))?;
             let name = path.to_ascii_uppercase();
-            return Ok(Variable { name, place: address.place, ty: VariableType::Elementary(address.ty) });
+            let ty = VariableType::Elementary(address.ty);
+            return Ok(Variable { name, place: address.place, ty, constant: false });
         }
         let (mut variable, mut rest) = self.resolve_root(path)?;
         for _ in 0..=2 * MAX_TYPE_DEPTH {
@@ -70,7 +71,8 @@ impl VariableTable {
             let position = lower.get(..end).and_then(|name| self.by_name.get(name.trim_end()));
             if let Some(found) = position.and_then(|at| self.variables.get(*at)) {
                 let ty = VariableType::Declared(found.ty);
-                return Ok((Variable { name: found.name.clone(), place: found.place, ty }, &path[end..]));
+                let variable = Variable { name: found.name.clone(), place: found.place, ty, constant: found.constant };
+                return Ok((variable, &path[end..]));
             }
         }
         let name = path.to_string();

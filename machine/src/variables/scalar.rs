@@ -50,6 +50,15 @@ impl VariableValue {
         }
     }
 
+    /// The bits of a whole number, as 64 signed bits.
+    pub(super) fn whole_bits(&self) -> Option<i64> {
+        match self {
+            VariableValue::Signed(number) => Some(*number),
+            VariableValue::Unsigned(number) => Some(*number as i64),
+            _ => None,
+        }
+    }
+
     /// Appends it as an IEC literal that [`super::VariableTable::write`] reads back.
     pub fn write_text(&self, out: &mut String) {
         // Writing to a String does not fail.

@@ -222,7 +222,7 @@ fn debug(r: &mut Random) -> DebugSection {
             column: r.u32(),
         }),
         function_names: r.list(Random::text),
-        types: r.list(|r| match r.below(6) {
+        types: r.list(|r| match r.below(7) {
             0 => DebugType::Elementary(r.pick(ElementaryType::ALL)),
             1 => DebugType::Enumeration {
                 name: r.text(),
@@ -232,6 +232,11 @@ fn debug(r: &mut Random) -> DebugSection {
             2 => DebugType::String { capacity: r.u16() },
             3 => DebugType::WideString { capacity: r.u16() },
             4 => DebugType::Array { element: r.u16(), stride: r.u32(), dimensions: r.list(Random::bounds) },
+            5 => DebugType::Subrange {
+                base: r.pick(ElementaryType::ALL),
+                lower: r.next().cast_signed(),
+                upper: r.next().cast_signed(),
+            },
             _ => DebugType::Record { name: r.text(), fields: r.list(|r| (r.text(), r.u32(), r.u16())) },
         }),
         variables: r.list(|r| DebugVariable {
@@ -242,6 +247,7 @@ fn debug(r: &mut Random) -> DebugSection {
                 _ => DebugPlace::Bit(r.pick(BytePlace::ALL), r.u32(), r.next() as u8),
             },
             ty: r.u16(),
+            constant: r.coin(),
         }),
         instance_names: r.list(Random::text),
         resource_name: r.text(),
