@@ -21,4 +21,5 @@ pub mod mutate;
 pub mod oracle;
 pub mod random;
 pub mod shrink;
+pub mod st;
 pub mod statistics;
