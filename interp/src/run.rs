@@ -338,8 +338,13 @@ macro_rules! define_run {
                         }
                     )*
                     Code::Enter => {
-                        registers.zero(op.dst, op.a);
-                        memory[frame as usize..(frame + op.b) as usize].fill(0);
+                        // Most functions have nothing to zero: then no call of a fill that does nothing.
+                        if op.a != 0 {
+                            registers.zero(op.dst, op.a);
+                        }
+                        if op.b != 0 {
+                            memory[frame as usize..(frame + op.b) as usize].fill(0);
+                        }
                         check_deadline!();
                     }
                     Code::Header => check_deadline!(),

@@ -1,9 +1,11 @@
 //! The register form: what the interpreter runs. Private to this crate and rebuilt at each load; no file holds it.
 //!
-//! An operation is 16 bytes: a code and three 32-bit operands (`dst`, `a`, `b`), mostly registers of the running call's window.
+//! An operation is 16 bytes: a code, a small number `x` and three 32-bit operands (`dst`, `a`, `b`), mostly registers of the running
+//! call's window. Operations on array elements have the array's bounds and strides behind them, as operations of code `Data`.
 //! Window of a call: `this` (functions of a block only), the `L` slots, the bases that the function needs (program slots, data block,
-//! frame bytes), then one register for each depth of the operand stack. A callee's window starts at its first argument, so
-//! arguments and results move nowhere. Registers hold bits: 32-bit values zero-extended, references as image offsets.
+//! frame bytes), the slots that it holds (`translate/held.rs`), then one register for each depth of the operand stack. A callee's
+//! window starts at its first argument, so arguments and results move nowhere. Registers hold bits: 32-bit values zero-extended,
+//! references as image offsets.
 //!
 //! What does not fit an operand stands in side tables of [`Program`] and is named by position.
 

@@ -116,7 +116,7 @@ impl Translator<'_> {
             }
             (_, None) if computed.is_some() => self.redirect_last(register),
             (_, Some(_)) if computed.is_some_and(|last| self.is_stored_form(&last, storage)) => {
-                self.redirect_last(register)
+                self.redirect_last(register);
             }
             (Pending::Register(a), Some(_)) if storage == Storage::Bool && self.is_bool(a) => {
                 self.value(Operation { code: Code::Move, x: 0, dst: register, a, b: 0 });

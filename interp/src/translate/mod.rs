@@ -5,6 +5,8 @@
 //! until it has to stand in its own register: at the ends of blocks, so that every way into a block finds the stack in the same
 //! registers, and before its source changes. See `stack.rs`.
 //!
+//! Slots in memory that a function uses much are registers from its start to its end: see `held.rs`.
+//!
 //! Traps stay precise. The bounds check of a pending element is the only pending thing that can trap; it is made before any
 //! operation that can trap itself or that writes memory, so nobody can tell that it came late.
 
