@@ -151,6 +151,9 @@ fn every_listed_code_is_explained() {
         assert_eq!(output.status.code(), Some(0), "{code}");
         assert!(stdout(&output).starts_with(code));
     }
+    let text = stdout(&run("explain v0074"));
+    assert!(text.contains("\nWrong:\n    function main\n") && text.contains("; error V0074"), "{text}");
+    assert!(!text.contains("Right:"), "{text}");
     let output = khz().args(["explain", "divide by zero"]).output().unwrap();
     assert!(stdout(&output).contains("divided by zero"));
     assert_eq!(run("explain X9999").status.code(), Some(1));

@@ -122,6 +122,19 @@ fn every_rule_has_a_rejected_file() {
 }
 
 #[test]
+fn every_rule_has_an_example_that_breaks_it() {
+    for rule in Rule::ALL {
+        let Some(text) = rule.example() else {
+            assert!(BROKEN_ELSEWHERE.contains(rule), "{rule} has no example");
+            continue;
+        };
+        let example = File::new(format!("example of {rule}"), text.to_string());
+        assert_eq!(example.expected.map(|(_, marked)| marked), Some(*rule));
+        assert_eq!(example.run(), Ok(()), "{rule}");
+    }
+}
+
+#[test]
 fn codes_are_unique_and_found_again() {
     let codes: BTreeSet<String> = Rule::ALL.iter().map(|rule| rule.code()).collect();
     assert_eq!(codes.len(), Rule::ALL.len());

@@ -68,8 +68,11 @@ fn entries() -> Vec<Entry> {
     });
     let reads =
         ReadCode::ALL.iter().map(|code| plain(code.code().into(), "container error", code.title(), code.explanation()));
-    let verifier =
-        VerifierRule::ALL.iter().map(|rule| plain(rule.code(), "verifier rule", rule.title(), rule.explanation()));
+    // What is right instead depends on the program: no example can say it.
+    let verifier = VerifierRule::ALL.iter().map(|rule| Entry {
+        wrong: rule.example().unwrap_or_default(),
+        ..plain(rule.code(), "verifier rule", rule.title(), rule.explanation())
+    });
     let traps = TrapCode::ALL.iter().map(|trap| plain(trap.name().into(), "trap", "ends a run", trap.text()));
     rules.chain(reads).chain(verifier).chain(traps).collect()
 }

@@ -30,6 +30,7 @@ pub mod rules;
 mod calls;
 mod document;
 mod error;
+mod examples;
 mod flow;
 mod for_proof;
 mod memory;
