@@ -1,5 +1,6 @@
 //! How many registers the deepest nesting of calls needs, so that running allocates nothing.
 
+use khz_bytecode::container::Owner;
 use khz_bytecode::ids::FunctionId;
 use khz_bytecode::verify::Verified;
 
@@ -43,14 +44,27 @@ impl CallWindows {
     }
 }
 
-/// Registers of the deepest nesting. Direct calls form no cycle, so their need is exact; virtual ones may recurse up to the container's
-/// call depth, each level with at most the largest window.
+/// Registers of the deepest nesting of calls.
+///
+/// Direct calls form no cycle, so what they need is exact. Virtual ones may recurse up to the container's call depth. Then the nesting is,
+/// outermost first: functions of a program, which nobody but such functions calls; functions that lead to a further virtual
+/// call; and behind the last virtual call direct ones. First and last part are at most what direct calls need at all.
 pub(super) fn register_count(verified: &Verified, program: &Program, windows: &CallWindows) -> usize {
-    let largest = program.functions.iter().map(|function| function.registers as usize).max().unwrap_or(0);
-    if windows.has_virtual_calls {
-        let depth = usize::from(verified.container().parameters.max_call_depth);
-        return largest.saturating_mul(depth.max(1));
+    let direct = direct_need(verified, program, windows);
+    if !windows.has_virtual_calls {
+        return direct;
     }
+    let functions = verified.container().functions.iter().zip(&program.functions).enumerate();
+    let recursive = functions.filter(|(index, (function, _))| {
+        let leads_on = verified.facts().functions[*index].calls_virtual;
+        leads_on && !matches!(function.owner, Owner::Program(_))
+    });
+    let largest = recursive.map(|(_, (_, entry))| entry.registers as usize).max().unwrap_or(0);
+    let depth = usize::from(verified.container().parameters.max_call_depth);
+    largest.saturating_mul(depth).saturating_add(direct.saturating_mul(2))
+}
+
+fn direct_need(verified: &Verified, program: &Program, windows: &CallWindows) -> usize {
     let mut order: Vec<usize> = (0..program.functions.len()).collect();
     order.sort_by_key(|function| verified.facts().functions[*function].call_depth);
     let mut needs = vec![0_usize; program.functions.len()];
