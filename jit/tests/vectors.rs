@@ -28,6 +28,7 @@ struct Writer {
     random: Random,
     ty: &'static str,
     text: String,
+    labels: usize,
 }
 
 impl Writer {
@@ -101,9 +102,33 @@ impl Writer {
         }
     }
 
+    /// An IF, with or without ELSE.
+    fn choice(&mut self, controls: &[&str]) {
+        let ty = self.ty;
+        self.labels += 1;
+        let label = self.labels;
+        self.expression(controls, 1);
+        self.expression(controls, 1);
+        let test = self.random.one(&["gt", "lt", "ge", "le", "eq", "ne"]);
+        let _ = writeln!(self.text, "{ty}.{test}\njump.unless else{label}");
+        self.statement(controls);
+        let nested = self.random.next(3) == 0 && self.labels < 6;
+        if self.random.next(2) == 0 {
+            let _ = writeln!(self.text, "jump end{label}\nelse{label}:");
+            if nested {
+                self.choice(controls)
+            } else {
+                self.statement(controls)
+            }
+            let _ = writeln!(self.text, "end{label}:\nnop");
+        } else {
+            let _ = writeln!(self.text, "else{label}:\nnop");
+        }
+    }
+
     fn statements(&mut self, controls: &[&str], most: usize) {
         for _ in 0..self.random.next(most) + 1 {
-            self.statement(controls);
+            if self.random.next(4) == 0 { self.choice(controls) } else { self.statement(controls) }
         }
     }
 
@@ -121,7 +146,8 @@ impl Writer {
 
 fn program(seed: u64) -> String {
     let ty = if seed.is_multiple_of(3) { "f64" } else { "f32" };
-    let mut writer = Writer { random: Random(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1), ty, text: String::new() };
+    let mut writer =
+        Writer { random: Random(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1), ty, text: String::new(), labels: 0 };
     for (outer, control, inner, within) in [("ka", "i", "kb", "k"), ("kc", "j", "kd", "k")] {
         writer.for_loop(outer, |writer| {
             if writer.random.next(2) == 0 {
@@ -153,11 +179,13 @@ fn program(seed: u64) -> String {
 
 #[test]
 fn random_loops_over_floats_run_the_same_in_vectors() {
-    let mut in_vectors = 0;
+    let (mut in_vectors, mut chosen) = (0, 0);
     let without = Passes { vectorise: false, ..Passes::ALL };
-    for seed in 1..=600 {
+    for seed in 1..=800 {
         let text = program(seed);
-        in_vectors += usize::from(form(&text, Passes::ALL).contains("splat"));
+        let shown = form(&text, Passes::ALL);
+        in_vectors += usize::from(shown.contains("splat"));
+        chosen += usize::from(shown.contains(":f32x4 = select") || shown.contains(":f64x2 = select"));
         let options = |passes| JitOptions { fuel: false, verify_ir: true, passes };
         let mut plain = load_with(&text, options(Passes::NONE));
         let mut scalar = load_with(&text, options(without));
@@ -170,5 +198,5 @@ fn random_loops_over_floats_run_the_same_in_vectors() {
             assert_eq!(vector.image.first_difference(&plain.image), None, "seed {seed} scan {scan}\n{text}");
         }
     }
-    assert!(in_vectors > 40, "{in_vectors} programs in vectors");
+    assert!(in_vectors > 40 && chosen > 3, "{in_vectors} programs in vectors, {chosen} with IFs");
 }

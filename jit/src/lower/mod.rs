@@ -260,7 +260,11 @@ impl Lowerer<'_, '_> {
             }
             Op::Select { condition, then, otherwise } => {
                 let (condition, then, otherwise) = (self.value(*condition), self.value(*then), self.value(*otherwise));
-                let clif = self.builder.ins().select(condition, then, otherwise);
+                let clif = if self.builder.func.dfg.value_type(condition).is_vector() {
+                    self.builder.ins().bitselect(condition, then, otherwise)
+                } else {
+                    self.builder.ins().select(condition, then, otherwise)
+                };
                 self.define(results, clif);
             }
             Op::Splat(_) | Op::Lane(..) | Op::Ramp { .. } => self.vector(instruction),

@@ -279,6 +279,11 @@ impl Lowerer<'_, '_> {
             _ => return None,
         };
         let flag = self.builder.ins().fcmp(code, a, b);
+        let ty = self.builder.func.dfg.value_type(a);
+        if ty.is_vector() {
+            // All bits of a lane or none, in the type that it is asked in.
+            return Some(self.builder.ins().bitcast(ty, MemFlagsData::new(), flag));
+        }
         Some(self.builder.ins().uextend(types::I32, flag))
     }
 

@@ -13,12 +13,12 @@ const VECTOR_BYTES: i64 = 16;
 /// Most vectors that a body computes: what registers hold.
 const MOST_VECTORS: i64 = 32;
 
-/// Rewrites the loop; leaves it alone where its step is not where `for.next` puts it.
-pub(super) fn emit(function: &mut Function, nest: &Nest, kinds: &Kinds) {
+/// Rewrites the loop; leaves it alone and says so where its step is not where `for.next` puts it.
+pub(super) fn emit(function: &mut Function, nest: &Nest, kinds: &Kinds) -> bool {
     let lanes = Nest::lanes(kinds.ty);
     let abreast = abreast(nest, kinds, lanes);
     if !take_longer_steps(function, nest, lanes * abreast) {
-        return;
+        return false;
     }
     let mut variables = |var: &Var| (*var, (0..abreast).map(|_| function.new_variable(kinds.ty)).collect());
     let vectors = kinds.lanes.iter().map(&mut variables).collect();
@@ -28,10 +28,11 @@ pub(super) fn emit(function: &mut Function, nest: &Nest, kinds: &Kinds) {
     for block in &nest.blocks {
         emit.block(function, *block);
     }
-    let Some(latch) = nest.blocks.last() else { return };
+    let Some(latch) = nest.blocks.last() else { return true };
     emit.out = std::mem::take(&mut function.blocks[latch.index()].instructions);
     emit.finish(function);
     function.blocks[latch.index()].instructions = std::mem::take(&mut emit.out);
+    true
 }
 
 /// How many vectors go side by side, so that one need not wait for the result of the other: only around an inner loop, which is where sums are.
@@ -114,7 +115,7 @@ impl Emit<'_> {
             self.place = instruction.place;
             match self.kind(&instruction) {
                 Kind::Serial => self.serial.push(instruction),
-                Kind::Lanes => {
+                Kind::Lanes | Kind::Mask => {
                     for number in 0..self.abreast {
                         self.lanes_of(function, &instruction, number);
                     }
@@ -152,6 +153,11 @@ impl Emit<'_> {
                 for operand in operands {
                     *operand = self.vector(function, *operand, at);
                 }
+            }
+            Op::Select { condition, then, otherwise } => {
+                *condition = self.vector(function, *condition, at);
+                *then = self.vector(function, *then, at);
+                *otherwise = self.vector(function, *otherwise, at);
             }
             Op::Get(var) => *var = self.variable(*var, at),
             Op::Set(var, value) => {
@@ -238,7 +244,7 @@ impl Emit<'_> {
             return *known;
         }
         let copy = match self.kinds.of(value) {
-            Kind::Same | Kind::Serial => return value,
+            Kind::Same | Kind::Serial | Kind::Mask => return value,
             Kind::Lanes => {
                 let scalar = if self.kinds.ty == Type::F32x4 { Type::F32 } else { Type::F64 };
                 let vector = self.vector(function, value, (lane / self.lanes) as usize);

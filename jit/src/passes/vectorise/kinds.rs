@@ -18,6 +18,8 @@ pub(in crate::passes) enum Kind {
     Counting(i64),
     /// A float of its own in each.
     Lanes,
+    /// An answer of its own in each, all bits or none: only a select asks for it.
+    Mask,
     /// Depends on what the pass before left: computed one after the other.
     Serial,
 }
@@ -98,7 +100,8 @@ impl Kinds {
                 lanes = walk.lanes;
                 continue;
             }
-            let known = |value: &Value| crossing.get(value.index()).copied().unwrap_or(true);
+            // What flattening added is used in the body only.
+            let known = |value: &Value| crossing.get(value.index()).copied().unwrap_or(false);
             let crosses = walk.kinds.iter().any(|(value, kind)| *kind != Kind::Same && known(value));
             let ty = walk.ty?;
             let even = nest.passes % Nest::lanes(ty) == 0;
@@ -149,6 +152,15 @@ impl Sets {
         }
         let carried = read_first.intersection(&set).copied().filter(|var| *var != nest.control).collect();
         Some(Sets { set, carried })
+    }
+}
+
+/// Type of the vectors that a comparison of floats takes.
+fn compared(op: N) -> Option<Type> {
+    match op {
+        N::F32Eq | N::F32Ne | N::F32Lt | N::F32Le | N::F32Gt | N::F32Ge => Some(Type::F32x4),
+        N::F64Eq | N::F64Ne | N::F64Lt | N::F64Le | N::F64Gt | N::F64Ge => Some(Type::F64x2),
+        _ => None,
     }
 }
 
@@ -227,9 +239,23 @@ impl<'a> Walk<'a> {
                 let kind = self.access(address, access.storage, true)?;
                 (fits && kind == Kind::Lanes).then_some(kind)
             }
+            Op::Select { condition, then, otherwise } => self.select(*condition, [*then, *otherwise]),
             // The tests of this loop and of the one inside ask for control variables.
             Op::ForContinues(_) => Some(Kind::Same),
             Op::ForIsEmpty(test) => (self.of(test.control) == Kind::Same).then_some(Kind::Same),
+            _ => None,
+        }
+    }
+
+    /// Chosen lane by lane where the answer is; elsewhere only where nothing has lanes.
+    fn select(&mut self, condition: Value, values: [Value; 2]) -> Option<Kind> {
+        let kinds = values.map(|value| self.of(value));
+        let fits = kinds.iter().all(|kind| matches!(kind, Kind::Lanes | Kind::Same));
+        let scalar = if self.ty? == Type::F32x4 { Type::F32 } else { Type::F64 };
+        let of_type = self.function.ty(values[0]) == scalar;
+        match self.of(condition) {
+            Kind::Mask => (fits && of_type).then_some(Kind::Lanes),
+            Kind::Same => (kinds == [Kind::Same; 2]).then_some(Kind::Same),
             _ => None,
         }
     }
@@ -276,7 +302,7 @@ impl<'a> Walk<'a> {
                 self.grown |= self.lanes.insert(var);
                 Some(kind)
             }
-            Kind::Counting(_) | Kind::Serial => None,
+            Kind::Counting(_) | Kind::Serial | Kind::Mask => None,
         }
     }
 
@@ -286,10 +312,16 @@ impl<'a> Walk<'a> {
         if op.trap().is_some() {
             return None;
         }
+        if kinds.contains(&Kind::Mask) {
+            return None;
+        }
         if kinds.contains(&Kind::Serial) {
             return (!self.in_inner).then_some(Kind::Serial);
         }
         if kinds.contains(&Kind::Lanes) {
+            if let Some(ty) = compared(op) {
+                return self.vectors(ty).then_some(Kind::Mask);
+            }
             return self.float(op).then_some(Kind::Lanes);
         }
         if let Some(form) = self.sum(op, operands, result) {
@@ -378,7 +410,7 @@ impl<'a> Walk<'a> {
                 let dense = i128::from(growth) * i128::from(stride) == size;
                 (is_float && dense && !(stored && self.in_inner) && self.vectors(ty)).then_some(Kind::Lanes)
             }
-            Kind::Lanes | Kind::Serial => None,
+            Kind::Lanes | Kind::Serial | Kind::Mask => None,
         }
     }
 }

@@ -9,6 +9,7 @@
 //! fuel is left alone: there each pass is charged for itself.
 
 mod emit;
+mod flatten;
 mod kinds;
 
 use crate::mir::{Block, Const, Control, Counted, Function, LoopId, Op, Results, Terminator, Type, Value, Var};
@@ -26,22 +27,40 @@ pub fn run(function: &mut Function) {
         return;
     }
     let ranges = Ranges::new(function);
-    let blocks = blocks_of_loops(function);
+    let mut blocks = blocks_of_loops(function);
     let mut crossing = None;
-    // From the inside: an inner loop that is vectorised itself keeps the outer one as it is.
+    let mut has_inner = vec![false; function.loops.len()];
+    for data in &function.loops {
+        if let Some(parent) = data.parent {
+            has_inner[parent.index()] = true;
+        }
+    }
+    // From the outside: what is vectorised around an inner loop leaves that one as it is.
     let mut done = vec![false; function.loops.len()];
     for number in 0..function.loops.len() {
         let id = LoopId(number as u32);
-        let Some(nest) = Nest::find(function, id, &blocks, &ranges) else { continue };
-        if done[number] || nest.inner.is_some_and(|inner| done[inner.index()]) {
+        if done[number] || countable(function, id, &ranges).is_none() {
             continue;
         }
-        let crossing = crossing.get_or_insert_with(|| crossing_values(function));
-        let Some(kinds) = Kinds::find(function, &nest, &ranges, crossing) else { continue };
-        if let Some(inner) = nest.inner {
-            done[inner.index()] = true;
+        let crossing = crossing.get_or_insert_with(|| crossing_values(function)).as_slice();
+        let before = if has_inner[number] { None } else { flatten::flatten(function, id, &blocks[number]) };
+        if before.is_some() {
+            blocks[number] = vec![function.loops[number].header];
         }
-        emit::emit(function, &nest, &kinds);
+        let nest = Nest::find(function, id, &blocks, &ranges);
+        let nest = nest.filter(|nest| nest.inner.is_none_or(|inner| !done[inner.index()]));
+        let fresh = before.is_some().then(|| Ranges::new(function));
+        let ranges = fresh.as_ref().unwrap_or(&ranges);
+        let kinds = nest.as_ref().and_then(|nest| Kinds::find(function, nest, ranges, crossing));
+        match (nest, kinds, before) {
+            (Some(nest), Some(kinds), _) if emit::emit(function, &nest, &kinds) => {
+                if let Some(inner) = nest.inner {
+                    done[inner.index()] = true;
+                }
+            }
+            (_, _, Some(before)) => flatten::restore(function, before),
+            _ => {}
+        }
     }
 }
 
@@ -142,20 +161,21 @@ fn blocks_of_loops(function: &Function) -> Vec<Vec<Block>> {
     blocks
 }
 
-/// Which values are used in another block than their own.
+/// Which values are used in another loop than their own.
 fn crossing_values(function: &mut Function) -> Vec<bool> {
-    let mut home: Vec<Option<u32>> = vec![None; function.values.len()];
-    for (number, block) in function.blocks.iter().enumerate() {
+    let mut home: Vec<Option<LoopId>> = vec![None; function.values.len()];
+    for block in &function.blocks {
         for instruction in &block.instructions {
             for value in instruction.results.as_slice() {
-                home[value.index()] = Some(number as u32);
+                home[value.index()] = block.innermost_loop;
             }
         }
     }
     let mut crossing = vec![false; function.values.len()];
-    for (number, block) in function.blocks.iter_mut().enumerate() {
+    for block in &mut function.blocks {
+        let here = block.innermost_loop;
         let mut see = |value: &mut Value| {
-            crossing[value.index()] |= home[value.index()] != Some(number as u32);
+            crossing[value.index()] |= home[value.index()] != here;
         };
         for instruction in &mut block.instructions {
             instruction.op.for_each_operand(&mut see);
