@@ -116,9 +116,9 @@ impl Writer {
         if self.random.next(2) == 0 {
             let _ = writeln!(self.text, "jump end{label}\nelse{label}:");
             if nested {
-                self.choice(controls)
+                self.choice(controls);
             } else {
-                self.statement(controls)
+                self.statement(controls);
             }
             let _ = writeln!(self.text, "end{label}:\nnop");
         } else {
