@@ -48,7 +48,7 @@ impl Builder<'_> {
         let (tasks, extensions) = tasks.collect();
         self.section.task_extensions = extensions;
         let debug = self.debug(sources, hashes, &bases);
-        let parameters = self.parameters(&instances, startup_function);
+        let parameters = self.parameters(startup_function);
         Container {
             parameters,
             source_hash: hashes.all,
@@ -320,12 +320,12 @@ impl Builder<'_> {
         (task, extension)
     }
 
-    fn parameters(&mut self, instances: &[ProgramInstance], startup: Option<FunctionId>) -> Parameters {
+    fn parameters(&mut self, startup: Option<FunctionId>) -> Parameters {
         let mut known: Vec<Option<(u64, u64)>> = vec![None; self.costs.len()];
-        let entries = instances.iter().map(|instance| instance.entry).chain(startup);
+        // Every function of the container counts: one whose only call stands in dead code is in it too.
         let (mut depth, mut frame) = (1, 0);
-        for entry in entries {
-            let (own_depth, own_frame) = self.deepest(entry, &mut known);
+        for function in (0..self.costs.len()).filter_map(FunctionId::from_index) {
+            let (own_depth, own_frame) = self.deepest(function, &mut known);
             depth = depth.max(own_depth);
             frame = frame.max(own_frame);
         }
