@@ -20,6 +20,9 @@ use kinds::Kinds;
 /// Most passes of a vectorised loop that are looked for: beyond it an index would not fit the analysis.
 const MOST_PASSES: i64 = 1 << 24;
 
+/// Most bodies with IFs that are tried in one function: each costs a walk over all of it.
+const MOST_FLATTENED: usize = 32;
+
 /// Runs it.
 pub fn run(function: &mut Function) {
     // Other processors have other NaNs, which are made canonical operation by operation.
@@ -28,7 +31,7 @@ pub fn run(function: &mut Function) {
     }
     let ranges = Ranges::new(function);
     let mut blocks = blocks_of_loops(function);
-    let mut crossing = None;
+    let (mut crossing, mut flattened) = (None, 0);
     let mut has_inner = vec![false; function.loops.len()];
     for data in &function.loops {
         if let Some(parent) = data.parent {
@@ -43,8 +46,10 @@ pub fn run(function: &mut Function) {
             continue;
         }
         let crossing = crossing.get_or_insert_with(|| crossing_values(function)).as_slice();
-        let before = if has_inner[number] { None } else { flatten::flatten(function, id, &blocks[number]) };
+        let may_flatten = !has_inner[number] && flattened < MOST_FLATTENED;
+        let before = if may_flatten { flatten::flatten(function, id, &blocks[number]) } else { None };
         if before.is_some() {
+            flattened += 1;
             blocks[number] = vec![function.loops[number].header];
         }
         let nest = Nest::find(function, id, &blocks, &ranges);
