@@ -52,3 +52,20 @@ fn generated_programs_mean_what_their_trees_mean() {
     assert!(refused * 20 < PROGRAMS, "{refused} programs are refused");
     assert!(cut * 20 < programs, "{cut} programs take too long to say anything");
 }
+
+/// The tree without calls of blocks, the text with them: the comparison has to see it.
+#[test]
+fn a_tree_that_means_something_else_is_found() {
+    let mut found = 0;
+    for seed in 0..40 {
+        let source = khz_proof::st::generate(seed);
+        let text = khz_proof::st::print::print(&source);
+        let mut other = source.clone();
+        let mut tally = Tally::default();
+        for unit in &mut other.units {
+            unit.body.retain(|stmt| !matches!(stmt, khz_proof::st::tree::Stmt::Call(..)));
+        }
+        found += usize::from(oracle::check_text(&text, &other, seed, &mut tally).is_err());
+    }
+    assert!(found >= 10, "{found} of 40 programs without their calls of blocks are found out");
+}

@@ -156,16 +156,23 @@ impl Generator {
         Ty::K(self.kind())
     }
 
+    /// Mostly a type that is no composite, else one that is passed and returned whole.
+    fn whole_type(&mut self) -> Ty {
+        let ty = self.any_type(false);
+        let is_whole = self.is_copyable(ty) && self.source.plain(ty) == ty;
+        if is_whole && self.r.chance(30) { ty } else { self.single_type() }
+    }
+
     pub(super) fn variables(&mut self) {
         let kind = self.unit.kind;
         if kind == UnitKind::Function {
-            let (name, ty) = (self.unit.name.clone(), self.single_type());
+            let (name, ty) = (self.unit.name.clone(), self.whole_type());
             self.declare(name, ty, Class::Return);
         }
         let count = |generator: &mut Self, low, high| generator.r.between(low, high);
         if kind != UnitKind::Program {
             for number in 0..count(self, 0, 3) {
-                let ty = self.single_type();
+                let ty = self.whole_type();
                 self.declare(format!("in{number}"), ty, Class::Input);
             }
             for number in 0..count(self, 0, 2) {
@@ -173,7 +180,8 @@ impl Generator {
                 self.declare(format!("out{number}"), ty, Class::Output);
             }
             for number in 0..count(self, 0, 2) {
-                let ty = self.any_type(false);
+                let global = self.r.pick(&self.source.globals).map(|var| var.ty);
+                let ty = global.filter(|_| self.r.chance(50)).unwrap_or_else(|| self.any_type(false));
                 if self.is_copyable(ty) {
                     self.declare(format!("io{number}"), ty, Class::InOut);
                 }

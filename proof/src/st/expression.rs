@@ -21,6 +21,13 @@ pub(super) struct Shape {
     is_readable: bool,
 }
 
+impl Shape {
+    /// Whether it is a global or a part of one.
+    pub(super) fn is_global(&self) -> bool {
+        matches!(self.base, Base::Global(_))
+    }
+}
+
 fn boxed(expr: Expr) -> Box<Expr> {
     Box::new(expr)
 }
@@ -143,7 +150,7 @@ impl Generator {
         let Some(variable) = self.integer_variable() else { return literal };
         let Ty::K(kind) = variable.ty else { return literal };
         let (least, most) = kind.limits();
-        if !self.is_pure && self.r.chance(12) {
+        if !self.is_pure && self.r.chance(20) {
             if self.r.chance(50) {
                 let one = lit(kind, Value::Int(1), false);
                 return Expr { ty: variable.ty, kind: ExprKind::Bin(Op::Add, boxed(variable), boxed(one)) };
@@ -207,7 +214,7 @@ impl Generator {
                     Some(Expr { ty, kind: ExprKind::Lit(value, typed) })
                 }
                 Def::Subrange(base, low, high) => {
-                    let safe = self.is_pure || self.r.chance(88);
+                    let safe = self.is_pure || self.r.chance(72);
                     if !safe {
                         return Some(self.expr(base, depth));
                     }
@@ -219,6 +226,11 @@ impl Generator {
                     Some(Expr { ty: Ty::K(base), kind: ExprKind::Std(Function::Limit, inputs) })
                 }
                 _ => {
+                    if self.r.chance(50)
+                        && let Some(call) = self.call(ty, depth)
+                    {
+                        return Some(call);
+                    }
                     let place = self.place(ty, false)?;
                     Some(Expr { ty, kind: ExprKind::Get(place) })
                 }
@@ -279,7 +291,7 @@ impl Generator {
             return self.leaf(kind);
         }
         let d = depth - 1;
-        if self.r.chance(12)
+        if self.r.chance(25)
             && let Some(call) = self.call(Ty::K(kind), d)
         {
             return call;
@@ -472,6 +484,15 @@ impl Generator {
 
     fn conversion(&mut self, kind: Kind, depth: usize) -> Expr {
         let mut from = self.kind();
+        let results = self.source.units.iter().filter(|unit| unit.kind == UnitKind::Function);
+        let results: Vec<Kind> =
+            results.filter_map(|unit| if let Ty::K(kind) = unit.vars[0].ty { Some(kind) } else { None }).collect();
+        let wanted = self.r.pick(&results).copied().filter(|from| *from != Kind::Time && kind != Kind::Time);
+        if let Some(result) = wanted.filter(|from| *from != kind && self.r.chance(50))
+            && let Some(call) = self.call(Ty::K(result), depth)
+        {
+            return Expr { ty: Ty::K(kind), kind: ExprKind::Conv(boxed(call)) };
+        }
         if kind == Kind::Time || from == Kind::Time {
             // Only what both tables have without rounding.
             from =

@@ -169,17 +169,28 @@ impl Generator {
         let ty = *self.r.pick(&wanted)?;
         let was = std::mem::replace(&mut self.is_pure, true);
         let target = self.place(ty, true);
-        let source = self.place(ty, false);
+        let is_indexed = target
+            .as_ref()
+            .is_some_and(|place| place.steps.iter().any(|step| matches!(step, super::tree::Step::Index(_))));
+        self.is_pure = was || is_indexed;
+        let value = self.value(ty, 2);
         self.is_pure = was;
-        let (target, source) = (target?, source?);
-        Some(Stmt::Assign(target, Expr { ty, kind: ExprKind::Get(source) }))
+        Some(Stmt::Assign(target?, value?))
     }
 
     fn assign(&mut self) -> Option<Stmt> {
-        let at = self.r.below(self.shapes.len());
+        let globals: Vec<usize> = (0..self.shapes.len()).filter(|at| self.shapes[*at].is_global()).collect();
+        // What functions do to globals while an expression is evaluated shows in which order it is.
+        let any = self.r.below(self.shapes.len());
+        let is_function = self.unit.kind == UnitKind::Function;
+        let ranges = (0..self.shapes.len()).filter(|at| self.source.plain(self.shapes[*at].ty) != self.shapes[*at].ty);
+        let ranges: Vec<usize> = ranges.collect();
+        let at = if self.r.chance(12) { self.r.pick(&ranges).copied() } else { None };
+        let at =
+            at.or_else(|| self.r.pick(&globals).copied().filter(|_| is_function && self.r.chance(50))).unwrap_or(any);
         let ty = self.shapes.get(at).filter(|shape| shape.is_writable).map(|shape| shape.ty)?;
         if !self.is_single(ty) {
-            return None;
+            return self.copy();
         }
         // Either the place may trap, or the value may do something: nothing tells which of the two comes first.
         let place_is_safe = self.r.chance(85);
@@ -311,8 +322,11 @@ impl Generator {
         // What is stored in the block when a later argument traps is left open: nothing here traps.
         let was = std::mem::replace(&mut self.is_pure, true);
         let place = self.place(ty, false);
-        let args = self.args(&params, 80);
+        let mut args = self.args(&params, 80);
         self.is_pure = was;
+        if matches!(self.source.types[id].def, Def::Standard(_)) {
+            args.iter_mut().flatten().for_each(no_negative_time);
+        }
         Some(Stmt::Call(place?, args?))
     }
 
@@ -321,7 +335,8 @@ impl Generator {
         let mut args = Vec::new();
         for (at, (class, ty)) in params.iter().enumerate() {
             match class {
-                Class::Input if self.r.chance(given) => {
+                // What is no single value has no default to fall back to.
+                Class::Input if !self.is_single(*ty) || self.r.chance(given) => {
                     let value = self.value(*ty, 2)?;
                     args.push(Arg::In(at, value));
                 }
@@ -340,5 +355,16 @@ impl Generator {
             }
         }
         Some(args)
+    }
+}
+
+/// The standard's figures say nothing of a timer with a negative time.
+fn no_negative_time(arg: &mut Arg) {
+    if let Arg::In(_, value) = arg
+        && value.ty == Ty::K(Kind::Time)
+    {
+        let zero = Expr { ty: value.ty, kind: ExprKind::Lit(Value::Int(0), true) };
+        let inputs = vec![zero, value.clone()];
+        value.kind = ExprKind::Std(super::functions::Function::Max, inputs);
     }
 }

@@ -364,6 +364,9 @@ pub enum ExprKind {
     Call(usize, Vec<Arg>),
 }
 
+/// A branch of CASE: its labels, each from and to, and its statements.
+pub type Branch = (Vec<(i128, i128)>, Vec<Stmt>);
+
 /// A statement.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Stmt {
@@ -372,7 +375,7 @@ pub enum Stmt {
     /// IF, ELSIF, ELSE.
     If(Vec<(Expr, Vec<Stmt>)>, Vec<Stmt>),
     /// CASE: labels from, to.
-    Case(Expr, Vec<(Vec<(i128, i128)>, Vec<Stmt>)>, Vec<Stmt>),
+    Case(Expr, Vec<Branch>, Vec<Stmt>),
     /// FOR over a reserved variable: from, to, by.
     For(usize, Expr, Expr, Option<Expr>, Vec<Stmt>),
     /// WHILE with a reserved counter: `c := 0; WHILE c < limit AND e DO c := c + 1; … END_WHILE`.
