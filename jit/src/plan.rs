@@ -13,6 +13,7 @@ use khz_machine::image::ImageLayout;
 use crate::SHARED_FROM_INSTANCES;
 use crate::build::{ProgramMemory, Scope};
 use crate::code::Key;
+use crate::passes::inline;
 
 /// What all functions of a container are compiled under.
 pub(crate) fn scope<'a>(verified: &'a Verified, layout: &'a ImageLayout) -> Scope<'a> {
@@ -56,7 +57,7 @@ pub(crate) struct Plan {
     pub functions: BTreeMap<Key, BTreeSet<Key>>,
     /// Whether anything calls virtually, so that calls may recurse.
     pub calls_virtual: bool,
-    /// Instructions of everything that is reached, and bytes of their encoding.
+    /// Instructions of everything that is reached, bytes of their encoding, and what inlining may add: what memory is set aside for.
     pub instructions: usize,
 }
 
@@ -92,6 +93,9 @@ impl Plan {
         let functions = &scope.verified.container().functions;
         let facts = scope.verified.function(key.0);
         self.instructions += facts.instructions.len() + functions[key.0.index()].code.len() / 8;
+        let calls = facts.instructions.iter().filter(|placed| matches!(placed.instruction, Instruction::Call { .. }));
+        // An instruction of the mid-level form takes far fewer bytes than is set aside for one of bytecode.
+        self.instructions += inline::most_growth(calls.count()) / 8;
         let mut callees = BTreeSet::new();
         for placed in &facts.instructions {
             match placed.instruction {

@@ -20,6 +20,12 @@ use crate::mir::{
 const MOST_INSTRUCTIONS: usize = 240;
 /// Most instructions that a function may grow by: larger programs call, which keeps compiling linear.
 const MOST_GROWTH: usize = 2500;
+/// Most instructions of the mid-level form that inlining adds to a function with so many calls.
+#[must_use]
+pub fn most_growth(calls: usize) -> usize {
+    calls.saturating_mul(MOST_INSTRUCTIONS).min(MOST_GROWTH)
+}
+
 /// Deepest nesting of inlined calls.
 const DEEPEST: usize = 4;
 
