@@ -192,6 +192,7 @@ impl<'a> Checker<'_, 'a> {
                 let high = values.pop();
                 values.swap(0, 1); // MAX(IN, MN), then MIN with MX.
                 let inner = self.fold_left(F::Max, values, span, want);
+                let inner = self.lower_limit_first(inner);
                 let Some(high) = high else { return broken(span) };
                 self.fold_left(F::Min, vec![inner, high], span, want)
             }
@@ -260,6 +261,18 @@ impl<'a> Checker<'_, 'a> {
             });
         }
         found.unwrap_or_else(|| broken(span))
+    }
+
+    /// MAX(IN, MN) of a LIMIT, evaluated as it is written: MN first. Only of floats it matters which is the first operand.
+    fn lower_limit_first(&self, mut inner: Expr) -> Expr {
+        let real = self.an.types.elementary(inner.ty).is_some_and(is_real);
+        if let ExprKind::Binary(op @ BinOp::Max, input, limit) = &mut inner.kind {
+            std::mem::swap(input, limit);
+            if real {
+                *op = BinOp::Raise;
+            }
+        }
+        inner
     }
 
     fn settle_number(&mut self, value: Expr, want: Ty, real: bool) -> Expr {

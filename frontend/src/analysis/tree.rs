@@ -458,6 +458,8 @@ pub enum BinOp {
     Ge,
     Min,
     Max,
+    /// MAX of floats with the second operand as its first: LIMIT raises its input to the lower limit, which is evaluated before.
+    Raise,
     Shl,
     Shr,
     Rol,
@@ -487,7 +489,7 @@ impl BinOp {
             BinOp::Gt => ">",
             BinOp::Ge => ">=",
             BinOp::Min => "MIN",
-            BinOp::Max => "MAX",
+            BinOp::Max | BinOp::Raise => "MAX",
             BinOp::Shl => "SHL",
             BinOp::Shr => "SHR",
             BinOp::Rol => "ROL",

@@ -156,6 +156,25 @@ impl FunctionBuilder<'_, '_> {
         }
     }
 
+    /// MAX(b, a) of floats, `a` evaluated first; a constant need not wait in a slot.
+    fn raise(&mut self, a: &Expr, b: &Expr, ty: E) {
+        let Some(found) = ops::binary(BinOp::Max, ty) else { return };
+        if matches!(a.kind, ExprKind::Const(_)) {
+            self.value(b);
+            self.value(a);
+        } else {
+            let storage =
+                if ty == E::Real { khz_bytecode::value::Storage::F32 } else { khz_bytecode::value::Storage::F64 };
+            self.value(a);
+            let slot = self.scratch(storage);
+            self.e.push(I::SlotStore { place: SlotPlace::Local, index: slot }, 1, 0);
+            self.value(b);
+            self.e.push(I::SlotLoad { place: SlotPlace::Local, index: slot }, 0, 1);
+            self.release(slot);
+        }
+        self.numeric(found);
+    }
+
     fn binary(&mut self, op: BinOp, a: &Expr, b: &Expr, ty: E, whole: &Expr) {
         match op {
             BinOp::AndThen | BinOp::OrElse => {
@@ -176,6 +195,10 @@ impl FunctionBuilder<'_, '_> {
             _ => {}
         }
         let (left, right) = (self.elementary(a.ty), self.elementary(b.ty));
+        if op == BinOp::Raise {
+            self.raise(a, b, left);
+            return;
+        }
         let scaled = is_duration(left) != is_duration(right) && (is_real(left) || is_real(right));
         self.value(a);
         if scaled && is_duration(left) {
