@@ -214,7 +214,7 @@ impl Generator {
                     Some(Expr { ty, kind: ExprKind::Lit(value, typed) })
                 }
                 Def::Subrange(base, low, high) => {
-                    let safe = self.is_pure || self.r.chance(72);
+                    let safe = self.is_pure || self.r.chance(50);
                     if !safe {
                         return Some(self.expr(base, depth));
                     }

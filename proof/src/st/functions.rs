@@ -174,7 +174,8 @@ pub fn convert(from: Kind, to: Kind, value: &Value, cut: bool) -> Value {
 #[must_use]
 pub fn number_in(kind: Kind, text: &[u8]) -> Value {
     let (sign, digits) = match text.split_first() {
-        Some((b'-', rest)) => (-1, rest),
+        // A sign is no valid beginning of a number without one.
+        Some((b'-', rest)) if kind.is_signed() => (-1, rest),
         _ => (1, text),
     };
     let end = digits.iter().position(|byte| !byte.is_ascii_digit()).unwrap_or(digits.len());

@@ -185,7 +185,7 @@ impl Generator {
         let is_function = self.unit.kind == UnitKind::Function;
         let ranges = (0..self.shapes.len()).filter(|at| self.source.plain(self.shapes[*at].ty) != self.shapes[*at].ty);
         let ranges: Vec<usize> = ranges.collect();
-        let at = if self.r.chance(12) { self.r.pick(&ranges).copied() } else { None };
+        let at = if self.r.chance(20) { self.r.pick(&ranges).copied() } else { None };
         let at =
             at.or_else(|| self.r.pick(&globals).copied().filter(|_| is_function && self.r.chance(50))).unwrap_or(any);
         let ty = self.shapes.get(at).filter(|shape| shape.is_writable).map(|shape| shape.ty)?;
