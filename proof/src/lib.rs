@@ -5,7 +5,8 @@
 //!
 //! [`bytecode`] makes containers that verify by construction, from a seed ([`random`]); [`evaluator`] is a third, slow, checked
 //! reading of the documents; [`oracle`] runs one container in all engines and names the first difference; [`shrink`] makes what differs small; [`mutate`] spoils
-//! container files to see whether the reader and the verifier let through anything that the engines then disagree about. [`statistics`]
+//! container files to see whether the reader and the verifier let through anything that the engines then disagree about. [`st`] makes
+//! Structured Text together with its meaning, for the front end (`tests/st.rs`; `examples/st.rs` for long runs). [`statistics`]
 //! counts what was reached, because a search that never went there proves nothing.
 //!
 //! The crate knows engines only as [`khz_machine::engine::Engine`]: its user hands it makers of them. So it depends on neither, and a
