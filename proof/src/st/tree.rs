@@ -98,8 +98,10 @@ impl Kind {
     /// A number wrapped in the width of the type.
     #[must_use]
     pub fn wrap(self, value: i128) -> i128 {
-        let (low, high) = self.limits();
-        (value - low).rem_euclid(high - low + 1) + low
+        // The low bits alone count, so that a product or shift of which more is lost is right too.
+        let bits = self.bits();
+        let pattern = value & ((1 << bits) - 1);
+        if self.is_signed() && pattern >> (bits - 1) == 1 { pattern - (1 << bits) } else { pattern }
     }
 
     /// What the standard converts to this type by itself.
