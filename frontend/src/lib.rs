@@ -46,7 +46,5 @@ pub mod source;
 pub mod syntax;
 pub mod testing;
 
-pub use compile::{
-    Compilation, CompileOptions, CompiledResource, Dialect, SourceInput, check, compile, compile_tests,
-};
+pub use compile::{Compilation, CompileOptions, CompiledResource, Dialect, SourceInput, check, compile, compile_tests};
 pub use syntax::parser::parse;

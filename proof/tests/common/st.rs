@@ -10,6 +10,7 @@ use khz_bytecode::verify::verify;
 use khz_frontend::{CompileOptions, SourceInput};
 use khz_machine::engine::{DeadlineCell, Engine, Entry, Limits};
 use khz_machine::image::{Image, ImageLayout};
+use khz_machine::trap::Trap;
 use khz_machine::variables::{Variable, VariableTable, VariableValue};
 use khz_proof::random::Random;
 use khz_proof::st::evaluate::{Evaluator, Stop};
@@ -149,6 +150,22 @@ pub fn check(source: &Source, seed: u64, tally: &mut Tally) -> Result<(), Found>
     check_text(&print(source), source, seed, tally)
 }
 
+/// Whether a scan ended as the tree says.
+fn same_ending(place: &str, expected: &Result<(), Stop>, result: &Result<(), Trap>) -> Result<(), Found> {
+    match (expected, result) {
+        (Ok(()), Ok(())) => Ok(()),
+        (Err(Stop::Trap(code, values)), Err(trap)) if *code == trap.code => {
+            // What a step of zero shows besides is not written down.
+            let shown = matches!(code, TrapCode::ArrayIndex) || (*code == TrapCode::Range && *values != [0; 3]);
+            if shown && *values != trap.values {
+                return Err(found("trap values", format!("{place}: {:?} instead of {values:?}", trap.values)));
+            }
+            Ok(())
+        }
+        _ => Err(found("result", format!("{place}: {result:?} instead of {expected:?}"))),
+    }
+}
+
 /// Compares a text with a tree.
 pub fn check_text(text: &str, source: &Source, seed: u64, tally: &mut Tally) -> Result<(), Found> {
     let container = match compile(text) {
@@ -189,17 +206,7 @@ pub fn check_text(text: &str, source: &Source, seed: u64, tally: &mut Tally) -> 
             let limits = Limits { deadline: &deadline, fuel: None, task_index: 0 };
             let result = machine.engine.run(Entry::Instance(0), &mut machine.image, limits);
             let place = format!("{} scan {scan}", machine.name);
-            match (&expected, &result) {
-                (Ok(()), Ok(())) => {}
-                (Err(Stop::Trap(code, values)), Err(trap)) if *code == trap.code => {
-                    // What a step of zero shows besides is not written down.
-                    let shown = matches!(code, TrapCode::ArrayIndex) || (*code == TrapCode::Range && *values != [0; 3]);
-                    if shown && *values != trap.values {
-                        return Err(found("trap values", format!("{place}: {:?} instead of {values:?}", trap.values)));
-                    }
-                }
-                _ => return Err(found("result", format!("{place}: {result:?} instead of {expected:?}"))),
-            }
+            same_ending(&place, &expected, &result)?;
             for ((path, ty, value), variable) in wanted.iter().zip(places.iter()) {
                 let Some(variable) = variable else {
                     if path.starts_with("main.") {
