@@ -285,3 +285,19 @@ fn a_misspelt_attribute_is_noticed() {
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     assert!(stderr(&output).contains("warning[S0042]"), "{}", stderr(&output));
 }
+
+#[test]
+fn the_examples_of_traps_end_in_them_and_mended_they_do_not() {
+    let scratch = Scratch::new("trap-examples");
+    for trap in khz_bytecode::trap::TrapCode::ALL {
+        let (wrong, right) = trap.examples();
+        assert_eq!(wrong.is_empty(), right.is_empty(), "{trap}");
+        for (text, status) in [(wrong, 3), (right, 0)].into_iter().filter(|(text, _)| !text.is_empty()) {
+            let source = scratch.write("example.st", text);
+            let words = ["run", "--clock", "virtual", "--scans", "2", "--watchdog-us", "1000"];
+            let output = khz().args(words).arg(&source).output().unwrap();
+            assert_eq!(output.status.code(), Some(status), "{trap}: {}", stderr(&output));
+            assert!(status == 0 || stderr(&output).contains(trap.name()), "{trap}: {}", stderr(&output));
+        }
+    }
+}

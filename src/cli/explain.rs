@@ -73,6 +73,9 @@ fn entries() -> Vec<Entry> {
         wrong: rule.example().unwrap_or_default(),
         ..plain(rule.code(), "verifier rule", rule.title(), rule.explanation())
     });
-    let traps = TrapCode::ALL.iter().map(|trap| plain(trap.name().into(), "trap", "ends a run", trap.text()));
+    let traps = TrapCode::ALL.iter().map(|trap| {
+        let (wrong, right) = trap.examples();
+        Entry { wrong, right, ..plain(trap.name().into(), "trap", "ends a run", trap.text()) }
+    });
     rules.chain(reads).chain(verifier).chain(traps).collect()
 }
