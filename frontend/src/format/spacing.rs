@@ -83,7 +83,7 @@ impl<'a> Spacing<'a> {
             TokenKind::Keyword(word) => matches!(word, Keyword::True | Keyword::False),
             TokenKind::RightParen | TokenKind::RightBracket | TokenKind::Caret => true,
             TokenKind::Ident | TokenKind::Direct | TokenKind::MalformedDirect | TokenKind::Part => true,
-            kind => is_literal(kind),
+            kind => kind.is_literal(),
         }
     }
 
@@ -129,22 +129,6 @@ impl<'a> Spacing<'a> {
         let is_prefix = prefixes.into_iter().any(|word| self.scanned.is_word(before, word));
         is_prefix && self.scanned.kind(hash + 1) != TokenKind::Ident
     }
-}
-
-fn is_literal(kind: TokenKind) -> bool {
-    matches!(
-        kind,
-        TokenKind::Int
-            | TokenKind::BasedInt
-            | TokenKind::Real
-            | TokenKind::MalformedNumber
-            | TokenKind::Time
-            | TokenKind::Date
-            | TokenKind::TimeOfDay
-            | TokenKind::DateAndTime
-            | TokenKind::String
-            | TokenKind::WString
-    )
 }
 
 /// How tight an operator binds, as far as breaking lines goes: loosest first, from 1.

@@ -194,6 +194,23 @@ impl TokenKind {
         matches!(self, Self::Comment | Self::UnterminatedComment | Self::Pragma | Self::UnterminatedPragma)
     }
 
+    /// Whether it is a literal that was written to its end; TRUE and FALSE are keywords.
+    pub fn is_literal(self) -> bool {
+        matches!(
+            self,
+            Self::Int
+                | Self::BasedInt
+                | Self::Real
+                | Self::MalformedNumber
+                | Self::Time
+                | Self::Date
+                | Self::TimeOfDay
+                | Self::DateAndTime
+                | Self::String
+                | Self::WString
+        )
+    }
+
     /// How messages name the kind.
     pub fn describe(self) -> &'static str {
         match self {

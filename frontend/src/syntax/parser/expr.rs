@@ -379,19 +379,6 @@ pub(super) fn access_size(letter: Option<u8>) -> Option<AccessSize> {
 
 /// Whether a literal (without type and sign) begins with it.
 pub(super) fn literal_start(kind: TokenKind) -> bool {
-    matches!(
-        kind,
-        TokenKind::Int
-            | TokenKind::BasedInt
-            | TokenKind::Real
-            | TokenKind::MalformedNumber
-            | TokenKind::Time
-            | TokenKind::Date
-            | TokenKind::TimeOfDay
-            | TokenKind::DateAndTime
-            | TokenKind::String
-            | TokenKind::WString
-            | TokenKind::UnterminatedString
-            | TokenKind::Keyword(Keyword::True | Keyword::False)
-    )
+    let others = matches!(kind, TokenKind::UnterminatedString | TokenKind::Keyword(Keyword::True | Keyword::False));
+    others || kind.is_literal()
 }
