@@ -16,6 +16,7 @@
 #![forbid(unsafe_code)]
 
 pub mod assembler;
+pub mod canary;
 pub mod container;
 pub mod disassembler;
 pub mod documentation;
