@@ -45,11 +45,13 @@ pub struct JitOptions {
     pub verify_ir: bool,
     /// Which passes run.
     pub passes: Passes,
+    /// Whether it is noted which passes changed something ([`Jit::passes_fired`]): for tests, at the cost of a copy of each function for each pass.
+    pub note_passes: bool,
 }
 
 impl Default for JitOptions {
     fn default() -> Self {
-        JitOptions { fuel: false, verify_ir: cfg!(debug_assertions), passes: Passes::default() }
+        JitOptions { fuel: false, verify_ir: cfg!(debug_assertions), passes: Passes::default(), note_passes: false }
     }
 }
 
@@ -95,8 +97,8 @@ impl Jit {
     pub fn new(verified: Arc<Verified>, layout: &ImageLayout, options: JitOptions) -> Result<Jit, JitError> {
         let scope = plan::scope(&verified, layout);
         let plan = plan::Plan::new(&scope);
-        let (code, stack_bytes) = run::compile(&scope, &plan, options)?;
-        let parts = run::Parts::new(&scope, &plan, Arc::new(code), stack_bytes)?;
+        let compiled = run::compile(&scope, &plan, options)?;
+        let parts = run::Parts::new(&scope, &plan, compiled)?;
         Ok(Jit::from_parts(verified, parts))
     }
 }

@@ -17,10 +17,10 @@ use crate::build::{ProgramMemory, Scope, build};
 use crate::code::{Assembly, Code, Handle, Key, host_isa};
 use crate::context::{Context, OUT_OF_FUEL};
 use crate::lower::{Settings, lower, signature};
-use crate::passes::inline::Inliner;
+use crate::passes::{Improver, Passes};
 use crate::plan::{EntryPoint, Plan};
 use crate::runtime::{VirtualEntry, Virtuals};
-use crate::{JitError, JitOptions, MAX_STACK_BYTES, passes};
+use crate::{JitError, JitOptions, MAX_STACK_BYTES};
 
 /// What lowering needs to know of a target.
 pub(crate) fn settings_for(isa: &OwnedTargetIsa, plan: &Plan, options: JitOptions) -> Settings {
@@ -51,20 +51,26 @@ pub(crate) fn assembly(scope: &Scope<'_>, plan: &Plan, isa: OwnedTargetIsa) -> R
     Assembly::new(isa, plan.instructions, Box::new(signature))
 }
 
-/// Compiles a plan; gives the code and the bytes of native stack that its deepest nesting of calls may need.
-pub(crate) fn compile(scope: &Scope<'_>, plan: &Plan, options: JitOptions) -> Result<(Code, u64), JitError> {
+/// What compiling a plan gives.
+pub(crate) struct Compiled {
+    code: Code,
+    /// Bytes of native stack that the deepest nesting of calls may need.
+    stack_bytes: u64,
+    /// Passes that changed something, where that is noted.
+    fired: Option<Passes>,
+}
+
+/// Compiles a plan.
+pub(crate) fn compile(scope: &Scope<'_>, plan: &Plan, options: JitOptions) -> Result<Compiled, JitError> {
     let isa = host_isa(options.verify_ir)?;
     let settings = settings_for(&isa, plan, options);
     let mut assembly = assembly(scope, plan, isa)?;
     let mut compilation = assembly.compilation();
     let mut builder_context = FunctionBuilderContext::new();
-    let mut inliner = Inliner::new(scope);
+    let mut improver = Improver::new(scope, options, plan.calls_virtual);
     for key in plan.functions.keys() {
         let mut function = build(scope, key.0, key.1);
-        if options.passes.inline && !plan.calls_virtual {
-            inliner.run(&mut function, key.1);
-        }
-        passes::run(&mut function, scope.verified, options.passes, options.fuel);
+        improver.run(&mut function, key.1);
         assembly.start_function();
         lower(scope, &function, key.1, settings, &mut assembly, &mut compilation.func, &mut builder_context);
         assembly.define(*key, &mut compilation)?;
@@ -73,7 +79,8 @@ pub(crate) fn compile(scope: &Scope<'_>, plan: &Plan, options: JitOptions) -> Re
     if needed_bytes > MAX_STACK_BYTES {
         return Err(JitError::Stack { needed_bytes, limit_bytes: MAX_STACK_BYTES });
     }
-    Ok((assembly.finish(scope.layout)?, needed_bytes))
+    let code = assembly.finish(scope.layout)?;
+    Ok(Compiled { code, stack_bytes: needed_bytes, fired: improver.fired() })
 }
 
 /// What the deepest nesting of calls may take of a thread's stack: the longest chain of direct calls, or, where virtual calls may recurse, the
@@ -109,12 +116,15 @@ pub(crate) struct Parts {
     instances: Vec<Handle>,
     virtuals: Box<Virtuals>,
     stack_bytes: u64,
+    fired: Option<Passes>,
     code: Arc<Code>,
 }
 
 impl Parts {
     /// Handles of a plan's entries and the tables beside the code.
-    pub fn new(scope: &Scope<'_>, plan: &Plan, code: Arc<Code>, stack_bytes: u64) -> Result<Parts, JitError> {
+    pub fn new(scope: &Scope<'_>, plan: &Plan, compiled: Compiled) -> Result<Parts, JitError> {
+        let Compiled { code, stack_bytes, fired } = compiled;
+        let code = Arc::new(code);
         let handle = |entry: &EntryPoint| {
             let missing = JitError::Function { function: entry.key.0, reason: "it was not compiled".into() };
             Handle::new(Arc::clone(&code), entry.key, entry.shared).ok_or(missing)
@@ -130,6 +140,7 @@ impl Parts {
             instances: plan.instances.iter().map(handle).collect::<Result<_, _>>()?,
             virtuals: Box::new(Virtuals { map: InstanceMap::new(container), entries: entries.collect() }),
             stack_bytes,
+            fired,
             code,
         })
     }
@@ -157,6 +168,12 @@ impl Jit {
     #[must_use]
     pub fn stack_bytes(&self) -> u64 {
         self.parts.stack_bytes
+    }
+
+    /// Which passes changed the form of any function; `None` unless [`JitOptions::note_passes`] asked for it.
+    #[must_use]
+    pub fn passes_fired(&self) -> Option<Passes> {
+        self.parts.fired
     }
 
     fn handle(&self, entry: Entry) -> Option<&Handle> {

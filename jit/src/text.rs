@@ -12,10 +12,10 @@ use khz_machine::image::ImageLayout;
 use crate::build::{ProgramMemory, build};
 use crate::code::{Key, host_isa};
 use crate::lower::{Settings, lower};
-use crate::passes::inline::Inliner;
+use crate::passes::Improver;
 use crate::plan::{self, Plan};
 use crate::run::{assembly, settings_for};
-use crate::{JitError, JitOptions, mir, passes};
+use crate::{JitError, JitOptions, mir};
 
 /// The source line of a bytecode offset, as `file:line`.
 fn source_line(debug: Option<&DebugSection>, function: FunctionId, offset: u32) -> Option<String> {
@@ -58,10 +58,7 @@ fn form_of(
         return None;
     }
     let mut form = build(scope, key.0, key.1);
-    if options.passes.inline && !plan.calls_virtual {
-        Inliner::new(scope).run(&mut form, key.1);
-    }
-    passes::run(&mut form, scope.verified, options.passes, options.fuel);
+    Improver::new(scope, options, plan.calls_virtual).run(&mut form, key.1);
     Some((key, form))
 }
 

@@ -208,3 +208,16 @@ fn loops_over_independent_floats_run_in_vectors() {
     let recurrence = text("slot.load p i\nconst.i32 1\ni32.add\n", 15).replace("address d b v", "address d a v");
     assert!(!form(&recurrence, Passes::ALL).contains("f32x4"));
 }
+
+#[test]
+fn it_is_noted_which_passes_changed_something() {
+    let fired = |text: &str, passes: Passes| {
+        let options = JitOptions { passes, note_passes: true, ..JitOptions::default() };
+        let fired = load_with(text, options).engine.passes_fired().unwrap();
+        fired.rows().filter(|row| row.1).map(|row| row.0).collect::<Vec<_>>()
+    };
+    assert_eq!(fired(SUM, Passes::ALL), ["promote", "fold", "for_loops", "checks", "deadlines"]);
+    assert_eq!(fired(SUM, only(&["promote", "bools"])), ["promote"]);
+    assert_eq!(fired("function main\nreturn\nend\n", Passes::ALL), Vec::<&str>::new());
+    assert_eq!(load_with(SUM, JitOptions::default()).engine.passes_fired(), None);
+}

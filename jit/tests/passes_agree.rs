@@ -246,7 +246,7 @@ fn random_programs_run_the_same_with_and_without_passes() {
     let mut ended = 0;
     for seed in 1..=400 {
         let text = program(seed);
-        let options = |passes| JitOptions { fuel: true, verify_ir: true, passes };
+        let options = |passes| JitOptions { fuel: true, verify_ir: true, passes, ..JitOptions::default() };
         let mut plain = load_with(&text, options(Passes::NONE));
         let mut passed = load_with(&text, options(Passes::ALL));
         for scan in 0..3 {

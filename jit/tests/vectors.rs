@@ -186,7 +186,7 @@ fn random_loops_over_floats_run_the_same_in_vectors() {
         let shown = form(&text, Passes::ALL);
         in_vectors += usize::from(shown.contains("splat"));
         chosen += usize::from(shown.contains(":f32x4 = select") || shown.contains(":f64x2 = select"));
-        let options = |passes| JitOptions { fuel: false, verify_ir: true, passes };
+        let options = |passes| JitOptions { fuel: false, verify_ir: true, passes, ..JitOptions::default() };
         let mut plain = load_with(&text, options(Passes::NONE));
         let mut scalar = load_with(&text, options(without));
         let mut vector = load_with(&text, options(Passes::ALL));

@@ -1,6 +1,6 @@
 //! Improvements of the mid-level form: one file each, each a function of a [`Function`](crate::mir::Function) and what it calls.
 //!
-//! [`run`] gives the order, [`Passes`] switches them one by one, for measuring and for finding a fault. Each is linear in the size of the function.
+//! [`Improver::run`] gives the order, [`Passes`] switches them one by one, for measuring and for finding a fault. Each is linear in the size of the function.
 
 pub mod bools;
 pub mod checks;
@@ -15,13 +15,13 @@ pub mod repeats;
 pub mod threads;
 pub mod vectorise;
 
-use khz_bytecode::verify::Verified;
-
+use crate::JitOptions;
+use crate::build::{ProgramMemory, Scope};
 use crate::mir::Function;
 
 macro_rules! passes {
     ($($(#[$doc:meta])* $name:ident;)*) => {
-        /// Which passes run.
+        /// A set of passes: which run, or which changed something.
         #[derive(Debug, Clone, Copy, PartialEq, Eq)]
         pub struct Passes { $($(#[$doc])* pub $name: bool,)* }
 
@@ -41,6 +41,11 @@ macro_rules! passes {
                     _ => return None,
                 }
                 Some(self)
+            }
+
+            /// Each name with whether the pass is in the set, in the order of [`Passes::NAMES`].
+            pub fn rows(self) -> impl Iterator<Item = (&'static str, bool)> {
+                [$((stringify!($name), self.$name)),*].into_iter()
             }
         }
     };
@@ -77,39 +82,61 @@ impl Default for Passes {
     }
 }
 
-/// Runs the passes on a function. `fuel`: whether its code charges fuel.
-pub fn run(function: &mut Function, verified: &Verified, passes: Passes, fuel: bool) {
-    if passes.promote {
-        promote::run(function, promote::CallEffects::new(verified));
+/// Improves one function after the other, and remembers what helps with the next ones.
+pub struct Improver<'a> {
+    scope: &'a Scope<'a>,
+    /// `None` where nothing is inlined.
+    inliner: Option<inline::Inliner<'a>>,
+    passes: Passes,
+    fuel: bool,
+    /// Passes that have changed a function so far, where that is noted.
+    fired: Option<Passes>,
+}
+
+impl<'a> Improver<'a> {
+    /// Passes over the functions of a container. `calls_virtual`: whether calls count their depth, so that none may vanish.
+    #[must_use]
+    pub fn new(scope: &'a Scope<'a>, options: JitOptions, calls_virtual: bool) -> Self {
+        let JitOptions { passes, fuel, note_passes, .. } = options;
+        let inliner = (passes.inline && !calls_virtual).then(|| inline::Inliner::new(scope));
+        Improver { scope, inliner, passes, fuel, fired: note_passes.then_some(Passes::NONE) }
     }
-    if passes.fold {
-        fold::run(function);
+
+    /// Passes that have changed a function so far; `None` when that is not noted.
+    #[must_use]
+    pub fn fired(&self) -> Option<Passes> {
+        self.fired
     }
-    if passes.checks {
-        checks::run(function);
-    }
-    if passes.deadlines {
-        deadlines::run(function);
-    }
-    if passes.vectorise && !fuel {
-        vectorise::run(function);
-    }
-    if passes.for_loops {
-        for_loops::run(function);
-    }
-    if passes.fold {
-        fold::run(function);
-    }
-    if passes.if_convert {
-        if_convert::run(function);
-    }
-    if passes.threads {
-        threads::run(function);
-    }
-    if passes.repeats {
-        repeats::run(function);
-    }
-    if passes.bools {
-        bools::run(function);
+
+    /// Runs the passes on a function as it was built.
+    pub fn run(&mut self, function: &mut Function, program: ProgramMemory) {
+        let Improver { scope, inliner, passes, fuel, fired } = self;
+        let effects = promote::CallEffects::new(scope.verified);
+        macro_rules! steps {
+            ($($name:ident $(if $also:expr)? => $run:expr;)*) => { $(
+                if passes.$name $(&& $also)? {
+                    // Names that a pass made up and dropped again are no change.
+                    let before = fired.is_some().then(|| (function.blocks.clone(), function.loops.clone()));
+                    $run;
+                    if let (Some(fired), Some((blocks, loops))) = (fired.as_mut(), before) {
+                        fired.$name |= blocks != function.blocks || loops != function.loops;
+                    }
+                }
+            )* };
+        }
+        steps! {
+            inline => if let Some(inliner) = inliner { inliner.run(function, program) };
+            promote => promote::run(function, effects);
+            fold => fold::run(function);
+            checks => checks::run(function);
+            deadlines => deadlines::run(function);
+            vectorise if !*fuel => vectorise::run(function);
+            for_loops => for_loops::run(function);
+            fold => fold::run(function);
+            if_convert => if_convert::run(function);
+            threads => threads::run(function);
+            repeats => repeats::run(function);
+            bools => bools::run(function);
+        }
     }
 }
