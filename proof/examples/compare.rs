@@ -1,37 +1,49 @@
-//! Compares engines over many random programs: `compare FIRST_SEED COUNT [interp|jit]…`. What differs is printed small.
+//! Compares engines over many random containers: `compare FIRST_SEED COUNT [--threads N] [--scans N] [--cuts N] [interp|jit]…`. What differs
+//! is printed small; the exit status says whether anything did.
 #![allow(clippy::print_stdout, reason = "a program for people")]
 
-#[path = "../tests/common/mod.rs"]
 mod common;
+#[path = "../tests/common/mod.rs"]
+mod engines;
 
+use std::process::ExitCode;
 use std::sync::Arc;
 
 use khz_proof::bytecode::generate;
-use khz_proof::oracle::{Plan, compare, reduce};
+use khz_proof::campaign::Report;
+use khz_proof::oracle::{Maker, Plan, compare, reduce};
 use khz_proof::statistics::Statistics;
 
-fn main() {
-    let mut arguments = std::env::args().skip(1);
-    let mut number = || arguments.next().and_then(|word| word.parse::<u64>().ok());
-    let (first, count) = (number().unwrap_or(0), number().unwrap_or(1000));
-    let wanted: Vec<String> = arguments.collect();
-    let makers: Vec<_> = common::makers()
-        .into_iter()
-        .filter(|maker| wanted.is_empty() || wanted.iter().any(|name| name == maker.name))
-        .collect();
-    let mut statistics = Statistics::default();
-    let mut differences = 0;
-    for seed in first..first + count {
-        let verified = Arc::new(generate(seed));
-        let plan = Plan { seed, ..Plan::default() };
-        let Some(found) = compare(&verified, &makers, &plan, &mut statistics).difference() else { continue };
-        differences += 1;
-        println!("==== seed {seed}: {}", found.description.lines().take(3).collect::<Vec<_>>().join(" | "));
-        if differences <= 6 {
-            let only: Vec<_> = common::makers().into_iter().filter(|maker| maker.name == found.engine).collect();
-            let (shrunk, description) = reduce(&verified, &only, &plan, 4000);
+/// How many findings are made small.
+const REDUCED: usize = 6;
+
+fn main() -> ExitCode {
+    let arguments = common::Arguments::read(1000, &["scans", "cuts"]);
+    let plan = |seed| Plan {
+        seed,
+        scans: arguments.option("scans", 10) as u32,
+        cuts: arguments.option("cuts", 1) as u32,
+        ..Plan::default()
+    };
+    let makers = || -> Vec<Maker<'static>> {
+        engines::makers().into_iter().filter(|maker| arguments.wants(maker.name)).collect()
+    };
+    let report: Report<Statistics> = arguments.search(|seed, statistics: &mut Statistics| {
+        let found = compare(&Arc::new(generate(seed)), &makers(), &plan(seed), statistics).difference();
+        found.map(|found| found.description)
+    });
+    for (number, finding) in report.findings.iter().enumerate() {
+        let seed = finding.seed;
+        println!("==== seed {seed}: {}", finding.description.lines().take(3).collect::<Vec<_>>().join(" | "));
+        if number < REDUCED && !finding.description.starts_with("panic") {
+            let verified = Arc::new(generate(seed));
+            let again = compare(&verified, &makers(), &plan(seed), &mut Statistics::default()).difference();
+            let Some(found) = again else { continue };
+            let only: Vec<_> = makers().into_iter().filter(|maker| maker.name == found.engine).collect();
+            let (shrunk, description) = reduce(&verified, &only, &plan(seed), 4000);
             println!("{} instructions\n{description}", shrunk.instructions);
         }
     }
-    println!("{differences} differences\n{}", statistics.report());
+    println!("{}", report.figures.report());
+    ExitCode::from(u8::from(!report.findings.is_empty()))
 }

@@ -7,7 +7,7 @@
 //! reading of the documents; [`oracle`] runs one container in all engines and names the first difference; [`shrink`] makes what differs small; [`mutate`] spoils
 //! container files to see whether the reader and the verifier let through anything that the engines then disagree about. [`st`] makes
 //! Structured Text together with its meaning, for the front end (`tests/st.rs`; `examples/st.rs` for long runs). [`statistics`]
-//! counts what was reached, because a search that never went there proves nothing.
+//! counts what was reached, because a search that never went there proves nothing; [`campaign`] spreads many seeds over threads.
 //!
 //! The crate knows engines only as [`khz_machine::engine::Engine`]: its user hands it makers of them. So it depends on neither, and a
 //! further engine or one with a pass switched off is one more maker. Nothing here reads a clock or the environment: a seed is a program.
@@ -17,6 +17,7 @@
 #![allow(clippy::missing_panics_doc, reason = "a panic of this crate is a finding, never a matter of its callers")]
 
 pub mod bytecode;
+pub mod campaign;
 pub mod evaluator;
 pub mod mutate;
 pub mod oracle;

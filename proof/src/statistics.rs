@@ -6,6 +6,8 @@ use std::fmt::Write;
 use khz_bytecode::instruction::{ControlOp, HelperOp, Instruction, NumericOp};
 use khz_bytecode::trap::TrapCode;
 
+use crate::campaign::Figures;
+
 /// Opcodes lie below this.
 const OPCODES: usize = 0x400;
 
@@ -87,6 +89,20 @@ pub struct Statistics {
     pub written: Executed,
     /// How many programs have each property.
     pub features: BTreeMap<&'static str, u64>,
+}
+
+impl Figures for Statistics {
+    fn merge(&mut self, later: Self) {
+        self.programs += later.programs;
+        self.without_fuel += later.without_fuel;
+        self.runs += later.runs;
+        self.trapped += later.trapped;
+        self.executed.add(&later.executed);
+        self.written.add(&later.written);
+        for (name, count) in later.features {
+            *self.features.entry(name).or_default() += count;
+        }
+    }
 }
 
 impl Statistics {
