@@ -4,6 +4,10 @@ use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 
 use khz_frontend::SourceInput;
+use khz_frontend::diagnostics::Diagnostic;
+use khz_frontend::source::SourceMap;
+
+use crate::project::{self, Settings};
 
 /// Largest source or container file that is read, in bytes.
 pub const MAX_FILE_BYTES: u64 = 1 << 30;
@@ -16,9 +20,18 @@ const CONTAINER_MAGIC: [u8; 4] = 0x4950_4C43_u32.to_le_bytes();
 #[derive(Debug)]
 pub enum Input {
     /// Sources, in the order given; those of a folder by path.
-    Sources(Vec<SourceInput>),
+    Sources(Sources),
     /// One container and its file's name.
     Container(String, Vec<u8>),
+}
+
+/// Source files and how they are to be compiled.
+#[derive(Debug, Default)]
+pub struct Sources {
+    /// The files, in compile order.
+    pub files: Vec<SourceInput>,
+    /// What their project says, if they are one's.
+    pub settings: Settings,
 }
 
 /// Why a file could not be taken.
@@ -46,17 +59,34 @@ pub enum FileError {
     /// A folder without sources.
     #[error("{0}: no Structured Text file (.st) in this folder")]
     NoSources(PathBuf),
+    /// A project file, or what it leads to, is wrong.
+    #[error("the project file has errors")]
+    Project {
+        /// All that is wrong.
+        diagnostics: Vec<Diagnostic>,
+        /// The project files.
+        sources: SourceMap,
+    },
+    /// A project among other files.
+    #[error("{0}: a project is named by itself, not together with other files")]
+    ProjectAmongOthers(PathBuf),
     /// A container among other files.
     #[error("{0}: a container is run by itself, not together with other files")]
     ContainerAmongOthers(PathBuf),
 }
 
-/// Reads everything that `paths` name.
+/// Reads everything that `paths` name: files, folders, or one project (its folder or its khz.toml).
 ///
 /// # Errors
 /// The first file that can not be taken.
 pub fn read(paths: &[PathBuf]) -> Result<Input, FileError> {
-    let files = list(paths)?;
+    let (files, settings) = match paths {
+        [path] => match project::file_of(path) {
+            Some(file) => project::read(&file)?,
+            None => (list(paths)?, Settings::default()),
+        },
+        _ => (list(paths)?, Settings::default()),
+    };
     let mut sources = Vec::new();
     for path in &files {
         let bytes = read_file(path)?;
@@ -68,7 +98,7 @@ pub fn read(paths: &[PathBuf]) -> Result<Input, FileError> {
         }
         sources.push(SourceInput { name: path.display().to_string(), bytes });
     }
-    Ok(Input::Sources(sources))
+    Ok(Input::Sources(Sources { files: sources, settings }))
 }
 
 /// The files that `paths` name: each file itself, of a folder all sources below it by path.
@@ -78,6 +108,9 @@ pub fn read(paths: &[PathBuf]) -> Result<Input, FileError> {
 pub fn list(paths: &[PathBuf]) -> Result<Vec<PathBuf>, FileError> {
     let mut files = Vec::new();
     for path in paths {
+        if is_project(path) {
+            return Err(FileError::ProjectAmongOthers(path.clone()));
+        }
         if path.is_dir() {
             let before = files.len();
             collect_folder(path, &mut files)?;
@@ -117,7 +150,19 @@ pub fn read_file(path: &Path) -> Result<Vec<u8>, FileError> {
     Ok(mapping.to_vec())
 }
 
-fn collect_folder(folder: &Path, files: &mut Vec<PathBuf>) -> Result<(), FileError> {
+/// Whether a file's ending says that it is a project file.
+pub(crate) fn is_project(path: &Path) -> bool {
+    path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml"))
+}
+
+/// Whether a file's ending says that it is a source.
+pub(crate) fn is_source(path: &Path) -> bool {
+    let ending = path.extension().and_then(|ending| ending.to_str());
+    ending.is_some_and(|ending| SOURCE_ENDINGS.iter().any(|known| ending.eq_ignore_ascii_case(known)))
+}
+
+/// Adds all sources below a folder, by path.
+pub(crate) fn collect_folder(folder: &Path, files: &mut Vec<PathBuf>) -> Result<(), FileError> {
     // A work list instead of recursion: folders may be nested deeply. Links are not followed, so it ends.
     let mut folders = vec![folder.to_path_buf()];
     let mut found = Vec::new();
@@ -127,13 +172,9 @@ fn collect_folder(folder: &Path, files: &mut Vec<PathBuf>) -> Result<(), FileErr
             let entry = entry.map_err(refused)?;
             let kind = entry.file_type().map_err(refused)?;
             let path = entry.path();
-            let is_source = path
-                .extension()
-                .and_then(|e| e.to_str())
-                .is_some_and(|e| SOURCE_ENDINGS.iter().any(|s| e.eq_ignore_ascii_case(s)));
             if kind.is_dir() && !entry.file_name().to_string_lossy().starts_with('.') {
                 folders.push(path);
-            } else if is_source {
+            } else if is_source(&path) {
                 found.push(path);
             }
         }
@@ -161,7 +202,7 @@ mod tests {
             fs::write(folder.join(name), "x").unwrap();
         }
         let Input::Sources(sources) = read(std::slice::from_ref(&folder)).unwrap() else { panic!("sources expected") };
-        let names: Vec<_> = sources.iter().map(|s| s.name.rsplit('/').next().unwrap().to_string()).collect();
+        let names: Vec<_> = sources.files.iter().map(|s| s.name.rsplit('/').next().unwrap().to_string()).collect();
         assert_eq!(names, ["a.ST", "z.st"]);
         fs::write(folder.join("empty.st"), "").unwrap();
         assert!(matches!(read(std::slice::from_ref(&folder)), Err(FileError::Empty(_))));

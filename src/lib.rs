@@ -2,7 +2,7 @@
 //!
 //! Kilohertz compiles IEC 61131-3 Structured Text into verified bytecode containers and runs them, interpreted or as native code,
 //! under a scheduler that measures every task cycle and ends what overruns. This crate is the façade: it joins the stages
-//! ([`pipeline`]) reads files ([`files`]) and runs unit tests ([`testing`]). The stages themselves are crates of their own:
+//! ([`pipeline`]) reads files ([`files`]) and projects ([`project`]) and runs unit tests ([`testing`]). The stages themselves are crates of their own:
 //!
 //! - `khz-frontend`: text to containers, with diagnostics
 //! - `khz-bytecode`: containers, instructions, the verifier
@@ -14,6 +14,7 @@
 
 pub mod files;
 pub mod pipeline;
+pub mod project;
 pub mod testing;
 
 pub use {khz_bytecode, khz_frontend, khz_interp, khz_jit, khz_machine, khz_scheduler};

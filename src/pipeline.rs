@@ -7,7 +7,7 @@ use khz_bytecode::container::{self, Container, ReadError};
 use khz_bytecode::verify::{Verified, VerifyError, verify};
 use khz_frontend::diagnostics::Diagnostic;
 use khz_frontend::source::SourceMap;
-use khz_frontend::{CompileOptions, SourceInput};
+use khz_frontend::{CompileOptions, Dialect, SourceInput};
 use khz_interp::{Interpreter, InterpreterOptions};
 use khz_jit::{Jit, JitError, JitOptions};
 use khz_machine::engine::Engine;
@@ -97,13 +97,13 @@ impl EngineKind {
     }
 }
 
-/// From files to verified programs.
+/// From files to verified programs. `dialect`: goes before what the files' project says.
 ///
 /// # Errors
 /// The diagnostics of sources, or what is wrong with a container.
-pub fn load(input: Input, options: &CompileOptions) -> Result<Loaded, Refused> {
+pub fn load(input: Input, dialect: Option<Dialect>) -> Result<Loaded, Refused> {
     match input {
-        Input::Sources(sources) => compile(&sources, options),
+        Input::Sources(sources) => compile(&sources.files, &sources.settings.options(dialect)),
         Input::Container(file, bytes) => read(file, &bytes),
     }
 }

@@ -28,11 +28,30 @@ pub enum Dialect {
     Iec,
 }
 
+/// The task that runs every PROGRAM where the sources have no CONFIGURATION.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct DefaultTask {
+    /// Its name.
+    pub name: String,
+    /// Its interval in microseconds.
+    pub interval_us: u64,
+    /// Its priority; 0 is the highest.
+    pub priority: u16,
+}
+
+impl Default for DefaultTask {
+    fn default() -> Self {
+        DefaultTask { name: "default_task".to_owned(), interval_us: 10_000, priority: 0 }
+    }
+}
+
 /// How to compile.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct CompileOptions {
     /// Which implicit conversions are taken.
     pub dialect: Dialect,
+    /// The task of programs without a CONFIGURATION.
+    pub task: DefaultTask,
     /// Leave the debug section out.
     pub strip: bool,
 }
@@ -116,7 +135,7 @@ fn read(inputs: &[SourceInput]) -> Parsed {
 
 fn run(inputs: &[SourceInput], options: &CompileOptions, only_checks: bool) -> Compilation {
     let Parsed { sources, standard, mut ast, mut diagnostics } = read(inputs);
-    let (project, found) = analysis::analyze(&ast, options.dialect, standard);
+    let (project, found) = analysis::analyze(&ast, options, standard);
     diagnostics.extend(found);
     let mut resources = Vec::new();
     if !has_errors(&diagnostics) {
@@ -131,7 +150,7 @@ fn run(inputs: &[SourceInput], options: &CompileOptions, only_checks: bool) -> C
     if only_checks && desugar::has_tests(&ast) {
         let (units, found) = desugar::desugar(&mut ast);
         diagnostics.extend(found);
-        let (_, _, found) = analysis::analyze_tests(&ast, options.dialect, standard, &units);
+        let (_, _, found) = analysis::analyze_tests(&ast, options, standard, &units);
         // What is wrong outside of the tests has been found already.
         let mut seen: BTreeSet<(Span, &str, String)> = BTreeSet::new();
         seen.extend(diagnostics.iter().map(|found| (found.span, found.code(), found.message.clone())));
@@ -149,7 +168,7 @@ fn run_tests(inputs: &[SourceInput], options: &CompileOptions) -> TestCompilatio
     let Parsed { sources, standard, mut ast, mut diagnostics } = read(inputs);
     let (units, found) = desugar::desugar(&mut ast);
     diagnostics.extend(found);
-    let (project, findings, found) = analysis::analyze_tests(&ast, options.dialect, standard, &units);
+    let (project, findings, found) = analysis::analyze_tests(&ast, options, standard, &units);
     // Each test's resource checks what it reaches: a mistake there is found once for each.
     let mut seen: BTreeSet<(Span, &str, String)> = BTreeSet::new();
     diagnostics

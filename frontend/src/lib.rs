@@ -11,6 +11,7 @@
 //!   for what is wrong are then ours to word, and what is wrong in one place need not spoil the next).
 //! - `analysis` finds out what names mean and makes the typed tree: every type and every conversion stands in it.
 //! - `lower` makes instructions of the typed tree; it never sees the syntax tree.
+//! - [`project`] reads a `khz.toml`: which files there are, and how they are compiled.
 //! - [`testing`] makes programs of unit tests, which only [`compile_tests`] looks at.
 //! - [`compile()`] is all of it; [`check`] stops before the instructions.
 //! - [`diagnostics`] is one table of everything that can be said about a program.
@@ -42,9 +43,12 @@ pub mod compile;
 pub mod diagnostics;
 pub mod format;
 mod lower;
+pub mod project;
 pub mod source;
 pub mod syntax;
 pub mod testing;
 
-pub use compile::{Compilation, CompileOptions, CompiledResource, Dialect, SourceInput, check, compile, compile_tests};
+pub use compile::{
+    Compilation, CompileOptions, CompiledResource, DefaultTask, Dialect, SourceInput, check, compile, compile_tests,
+};
 pub use syntax::parser::parse;

@@ -67,12 +67,12 @@ pub enum DialectArg {
 /// Files, and how they are compiled.
 #[derive(Debug, Clone, Args)]
 pub struct Sources {
-    /// Structured Text files, a folder of them, or one container (.iplc)
+    /// Structured Text files, a folder of them, a project (khz.toml or its folder), or one container (.iplc)
     #[arg(required = true, value_name = "FILE")]
     pub files: Vec<PathBuf>,
-    /// Which rules of the language hold
-    #[arg(long, value_enum, default_value = "default")]
-    pub dialect: DialectArg,
+    /// Which rules of the language hold; without it, what the project says
+    #[arg(long, value_enum)]
+    pub dialect: Option<DialectArg>,
 }
 
 /// `khz check`.
@@ -102,9 +102,9 @@ pub struct BuildArgs {
     #[command(flatten)]
     #[allow(missing_docs, reason = "clap would show it as help of the group")]
     pub sources: Sources,
-    /// Where the container goes; several RESOURCEs give OUT.<resource>.iplc each
+    /// Where the container goes; several RESOURCEs give OUT.<resource>.iplc each. A project has a name, so it needs none
     #[arg(short, long, value_name = "OUT.iplc")]
-    pub output: PathBuf,
+    pub output: Option<PathBuf>,
     /// Leave the debug section out
     #[arg(long)]
     pub strip: bool,

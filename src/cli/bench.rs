@@ -11,7 +11,7 @@ use kilohertz::pipeline::EngineKind;
 use serde_json::{Value, json};
 
 use super::args::{BenchArgs, EnginesArg, Format};
-use super::output::{Failure, choose, compile_options, load, people, result, write_file};
+use super::output::{Failure, choose, dialect, load, people, result, write_file};
 use super::report::report_fault;
 use super::session::{Opened, Session};
 use super::stopwatch::Stopwatch;
@@ -64,9 +64,9 @@ pub fn run(args: &BenchArgs) -> Outcome {
 /// Time from source text to container; 0 for a container file.
 fn frontend_ns(args: &BenchArgs) -> Result<u64, Failure> {
     let Input::Sources(sources) = files::read(&args.sources.files)? else { return Ok(0) };
-    let options = compile_options(&args.sources);
+    let options = sources.settings.options(dialect(&args.sources));
     let watch = Stopwatch::start();
-    let compilation = khz_frontend::compile(&sources, &options);
+    let compilation = khz_frontend::compile(&sources.files, &options);
     let ns = watch.ns();
     drop(compilation);
     Ok(ns)

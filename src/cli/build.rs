@@ -3,15 +3,20 @@
 use std::path::{Path, PathBuf};
 
 use khz_bytecode::container;
+use kilohertz::files::{self, Input, Sources};
+use kilohertz::pipeline;
+use kilohertz::project::Settings;
 use serde_json::json;
 
 use super::args::{BuildArgs, Format};
-use super::output::{Failure, load, people, print_diagnostics, result, write_file};
+use super::output::{Failure, dialect, people, print_diagnostics, result, write_file};
 use super::{Outcome, Status};
 
 /// Runs it.
 pub fn run(args: &BuildArgs) -> Outcome {
-    let loaded = load(&args.sources)?;
+    let input = files::read(&args.sources.files)?;
+    let output = output_of(args, &input)?;
+    let loaded = pipeline::load(input, dialect(&args.sources))?;
     let several = loaded.programs.len() > 1;
     let mut written = Vec::new();
     for program in &loaded.programs {
@@ -20,7 +25,7 @@ pub fn run(args: &BuildArgs) -> Outcome {
             container::strip(&mut container);
         }
         let bytes = container::write(&container).map_err(Failure::refused)?;
-        let path = if several { path_for(&args.output, &program.name) } else { args.output.clone() };
+        let path = if several { path_for(&output, &program.name) } else { output.clone() };
         write_file(&path, &bytes)?;
         written.push((program.name.clone(), path, bytes.len()));
     }
@@ -40,6 +45,19 @@ pub fn run(args: &BuildArgs) -> Outcome {
         }
     }
     Ok(Status::Done)
+}
+
+/// Where the container goes: as asked for, else in the current folder by the project's name.
+fn output_of(args: &BuildArgs, input: &Input) -> Result<PathBuf, Failure> {
+    if let Some(output) = &args.output {
+        return Ok(output.clone());
+    }
+    match input {
+        Input::Sources(Sources { settings: Settings { name: Some(name), .. }, .. }) => {
+            Ok(PathBuf::from(format!("{name}.iplc")))
+        }
+        _ => Err(Failure::usage("where shall the container go? -o OUT.iplc is needed where there is no project")),
+    }
 }
 
 /// `OUT.<resource>.iplc` for `OUT.iplc`.

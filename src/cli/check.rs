@@ -5,7 +5,7 @@ use kilohertz::files;
 use kilohertz::files::Input;
 
 use super::args::{CheckArgs, Format};
-use super::output::{compile_options, load, people, print_diagnostics, result};
+use super::output::{dialect, load, people, print_diagnostics, result};
 use super::{Outcome, Status};
 
 /// Runs it.
@@ -19,7 +19,7 @@ pub fn run(args: &CheckArgs) -> Outcome {
         }
         return Ok(Status::Done);
     };
-    let checked = khz_frontend::check(&sources, &compile_options(&args.sources));
+    let checked = khz_frontend::check(&sources.files, &sources.settings.options(dialect(&args.sources)));
     print_diagnostics(&checked.diagnostics, &checked.sources, args.common.format);
     if args.common.format == Format::Human {
         let count = |severity| checked.diagnostics.iter().filter(|d| d.severity == severity).count();

@@ -3,11 +3,10 @@
 use std::io::{IsTerminal, Write};
 use std::path::Path;
 
-use khz_frontend::CompileOptions;
 use khz_frontend::Dialect;
 use khz_frontend::diagnostics::{Diagnostic, render};
 use khz_frontend::source::SourceMap;
-use kilohertz::files::{FileError, Input};
+use kilohertz::files::FileError;
 use kilohertz::pipeline::{self, Loaded, Program, Refused};
 use serde_json::{Value, json};
 
@@ -61,7 +60,12 @@ impl From<Refused> for Failure {
 
 impl From<FileError> for Failure {
     fn from(error: FileError) -> Self {
-        Failure::refused(error)
+        match error {
+            FileError::Project { diagnostics, sources } => {
+                Failure::Refused(Refused::Diagnostics { diagnostics, sources })
+            }
+            other => Failure::refused(other),
+        }
     }
 }
 
@@ -87,22 +91,17 @@ pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     std::fs::write(path, bytes).map_err(|error| Failure::Message(Status::Host, format!("{}: {error}", path.display())))
 }
 
-/// The options of the front end that the command line asks for.
-pub fn compile_options(sources: &Sources) -> CompileOptions {
-    let dialect = match sources.dialect {
+/// The dialect that the command line asks for.
+pub fn dialect(sources: &Sources) -> Option<Dialect> {
+    sources.dialect.map(|dialect| match dialect {
         DialectArg::Iec => Dialect::Iec,
         DialectArg::Default => Dialect::Default,
-    };
-    CompileOptions { dialect, ..CompileOptions::default() }
+    })
 }
 
 /// Reads and loads what the command line names.
 pub fn load(sources: &Sources) -> Result<Loaded, Failure> {
-    Ok(load_input(kilohertz::files::read(&sources.files)?, sources)?)
-}
-
-fn load_input(input: Input, sources: &Sources) -> Result<Loaded, Refused> {
-    pipeline::load(input, &compile_options(sources))
+    Ok(pipeline::load(kilohertz::files::read(&sources.files)?, dialect(sources))?)
 }
 
 /// The one RESOURCE that is meant.

@@ -6,7 +6,7 @@ use kilohertz::pipeline::{EngineKind, Refused};
 use kilohertz::testing::{self, Suite, Test, TestOptions, TestResult, report};
 
 use super::args::{EnginesArg, Format, TestArgs, TestFormat};
-use super::output::{Failure, compile_options, people, print_diagnostics, result};
+use super::output::{Failure, dialect, people, print_diagnostics, result};
 use super::{Outcome, Status};
 
 /// Runs it.
@@ -14,7 +14,7 @@ pub fn run(args: &TestArgs) -> Outcome {
     let Input::Sources(sources) = files::read(&args.sources.files)? else {
         return Err(Failure::refused("tests are Structured Text: name their sources, not a container"));
     };
-    let suite = match testing::compile(&sources, &compile_options(&args.sources)) {
+    let suite = match testing::compile(&sources.files, &sources.settings.options(dialect(&args.sources))) {
         Ok(suite) => suite,
         Err(refused) => return refuse(args, refused),
     };

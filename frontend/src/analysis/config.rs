@@ -18,8 +18,6 @@ use crate::syntax::symbol::Symbol;
 
 /// Priority of the task of programs without one: the lowest.
 const FREEWHEELING_PRIORITY: u16 = 65_535;
-/// Interval of the task that is made where there is no configuration, in microseconds.
-const DEFAULT_INTERVAL_US: u64 = 10_000;
 
 /// A resource whose bodies are still to be checked.
 pub(super) struct Planned {
@@ -116,9 +114,9 @@ impl<'a> Analyzer<'a> {
             return None;
         }
         let task = TaskPlan {
-            name: "default_task".to_owned(),
-            priority: 0,
-            interval_us: Some(DEFAULT_INTERVAL_US),
+            name: self.default_task.name.clone(),
+            priority: self.default_task.priority,
+            interval_us: Some(self.default_task.interval_us),
             single: SinglePlan::None,
             watchdog_us: 0,
             watchdog_sensitivity: 0,

@@ -30,7 +30,8 @@ use std::rc::Rc;
 
 use self::tree::{GlobalId, GlobalInfo, PouId, PouInfo, Project};
 use self::types::{Ty, TyId, TypeTable, Value};
-use crate::Dialect;
+use crate::compile::{CompileOptions, DefaultTask, Dialect};
+use crate::diagnostics::similar::nearest;
 use crate::diagnostics::{Diagnostic, Rule, Severity, semantic as rules};
 use crate::source::{FileId, Span};
 use crate::syntax::ast::{Ast, Ident, Pou, TypeDecl, VarDecl, VarSection};
@@ -42,8 +43,8 @@ const MAX_DEPENDENCE: u32 = 200;
 
 /// Checks a parsed program. `standard` is the file of the standard function blocks. The project is complete only when no
 /// diagnostic is an error.
-pub fn analyze(ast: &Ast, dialect: Dialect, standard: Option<FileId>) -> (Project, Vec<Diagnostic>) {
-    let mut analyzer = Analyzer::new(ast, dialect, standard);
+pub fn analyze(ast: &Ast, options: &CompileOptions, standard: Option<FileId>) -> (Project, Vec<Diagnostic>) {
+    let mut analyzer = Analyzer::new(ast, options, standard);
     analyzer.declare();
     let resources = analyzer.configure();
     let resources = analyzer.check_bodies(resources);
@@ -54,11 +55,11 @@ pub fn analyze(ast: &Ast, dialect: Dialect, standard: Option<FileId>) -> (Projec
 /// The same for the PROGRAMs that tests were made to: a resource for each, in their order, and what was found in it.
 pub fn analyze_tests(
     ast: &Ast,
-    dialect: Dialect,
+    options: &CompileOptions,
     standard: Option<FileId>,
     units: &[TestUnit],
 ) -> (Project, Vec<TestFindings>, Vec<Diagnostic>) {
-    let mut analyzer = Analyzer::new(ast, dialect, standard);
+    let mut analyzer = Analyzer::new(ast, options, standard);
     analyzer.tests = Some(testing::Tests::new(units));
     analyzer.declare();
     let resources = analyzer.configure_tests(units);
@@ -105,6 +106,8 @@ struct ConstEntry<'a> {
 struct Analyzer<'a> {
     ast: &'a Ast,
     dialect: Dialect,
+    /// The task of programs without a CONFIGURATION.
+    default_task: &'a DefaultTask,
     standard: Option<FileId>,
     diagnostics: Vec<Diagnostic>,
     types: TypeTable,
@@ -139,10 +142,11 @@ struct GlobalDecl<'a> {
 }
 
 impl<'a> Analyzer<'a> {
-    fn new(ast: &'a Ast, dialect: Dialect, standard: Option<FileId>) -> Self {
+    fn new(ast: &'a Ast, options: &'a CompileOptions, standard: Option<FileId>) -> Self {
         Analyzer {
             ast,
-            dialect,
+            dialect: options.dialect,
+            default_task: &options.task,
             standard,
             diagnostics: Vec::new(),
             types: <TypeTable as Default>::default(),
@@ -224,44 +228,17 @@ impl<'a> Analyzer<'a> {
         // Looking through all names for each of very many unknown ones would take time in their product.
         self.suggestions += 1;
         let known = known.take(if self.suggestions <= MAX_SUGGESTIONS { usize::MAX } else { 0 });
-        let mut best: Option<(usize, &str, Symbol)> = None;
         // A name that is known elsewhere but not here is no mistake of spelling.
-        for symbol in known.filter(|symbol| *symbol != ident.symbol) {
-            let name = self.text(symbol);
-            // Every short name is near to every other one.
-            let limit = (wanted.len() / 3).min(3);
-            if let Some(distance) = edit_distance(wanted, name, limit)
-                && best.is_none_or(|found| (distance, name) < (found.0, found.1))
-            {
-                best = Some((distance, name, symbol));
-            }
-        }
+        let known = known.filter(|symbol| *symbol != ident.symbol).map(|symbol| (self.text(symbol), symbol));
+        let best = nearest(wanted, known);
         let mut found = Diagnostic::new(rule, ident.span, message);
-        if let Some((_, _, symbol)) = best {
+        if let Some(symbol) = best {
             found = found.help(format!("did you mean `{}`?", self.ast.names.text_as_written(symbol)));
         }
         self.push(found);
     }
 }
 
-/// Letters to change to get from one name to the other, when at most `limit`.
-fn edit_distance(a: &str, b: &str, limit: usize) -> Option<usize> {
-    let (a, b) = (a.as_bytes(), b.as_bytes());
-    if a.len().abs_diff(b.len()) > limit || a.len() > 64 {
-        return None;
-    }
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, x) in a.iter().enumerate() {
-        let mut diagonal = row[0];
-        row[0] = i + 1;
-        for (j, y) in b.iter().enumerate() {
-            let change = diagonal + usize::from(x != y);
-            diagonal = row[j + 1];
-            row[j + 1] = change.min(diagonal + 1).min(row[j] + 1);
-        }
-    }
-    row.last().copied().filter(|distance| *distance <= limit)
-}
-
 pub(crate) use fold::NS_PER_MS;
 pub(crate) use init::scalar_bytes;
+pub(crate) use tasks::parse_duration_ns;

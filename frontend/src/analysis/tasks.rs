@@ -204,7 +204,7 @@ fn overrun_policy(name: &str) -> Option<OverrunPolicy> {
 }
 
 /// `T#1s500ms` of an attribute, in nanoseconds.
-fn parse_duration_ns(text: &str) -> Option<i64> {
+pub(crate) fn parse_duration_ns(text: &str) -> Option<i64> {
     let upper = text.trim().to_ascii_uppercase();
     let mut rest = ["LTIME#", "TIME#", "LT#", "T#"].iter().find_map(|prefix| upper.strip_prefix(prefix))?;
     if rest.is_empty() {

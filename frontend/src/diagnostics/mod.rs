@@ -7,8 +7,10 @@
 //! A [`Diagnostic`] is one occurrence of a rule at a place. To add one: add a row to the table (the compiler then wants
 //! the wrong and right example, and a test compiles both), and report `Diagnostic::new(&semantic::THE_ROW, span, text)`.
 
+pub mod files;
 pub mod render;
 pub mod semantic;
+pub(crate) mod similar;
 pub mod syntax;
 pub mod types;
 
@@ -40,7 +42,7 @@ impl Severity {
 /// A row of a diagnostics table.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Rule {
-    /// `P0001`: P for syntax, S for names and configuration, T for types.
+    /// `P0001`: P for syntax, S for names and configuration, T for types, F for files that are no plain Structured Text.
     pub code: &'static str,
     /// How bad an occurrence is.
     pub severity: Severity,
@@ -52,12 +54,16 @@ pub struct Rule {
     pub wrong: &'static str,
     /// The same file, mended: it gives no error.
     pub right: &'static str,
+    /// The name of that file; its ending says how it is read.
+    pub file: &'static str,
 }
 
 /// Declares a table of rules: a static for each row, and `TABLE` with all rows in order.
 macro_rules! rules {
     ($(#[doc = $table_doc:literal])* table;
-     $($name:ident = $code:literal $severity:ident $title:literal { $explanation:literal wrong $wrong:literal right $right:literal })*) => {
+     $($name:ident = $code:literal $severity:ident $title:literal {
+        $explanation:literal $(in $file:literal)? wrong $wrong:literal right $right:literal
+     })*) => {
         $(
             #[doc = concat!($code, ": ", $title, ".")]
             pub static $name: $crate::diagnostics::Rule = $crate::diagnostics::Rule {
@@ -67,17 +73,20 @@ macro_rules! rules {
                 explanation: $explanation,
                 wrong: $wrong,
                 right: $right,
+                file: $crate::diagnostics::rules!(file $($file)?),
             };
         )*
         $(#[doc = $table_doc])*
         pub static TABLE: &[&$crate::diagnostics::Rule] = &[$(&$name),*];
     };
+    (file) => { "example.st" };
+    (file $file:literal) => { $file };
 }
 pub(crate) use rules;
 
 /// All rows of all tables, in order of their codes.
 pub fn all_rules() -> impl Iterator<Item = &'static Rule> {
-    syntax::TABLE.iter().chain(semantic::TABLE).chain(types::TABLE).copied()
+    syntax::TABLE.iter().chain(semantic::TABLE).chain(types::TABLE).chain(files::TABLE).copied()
 }
 
 /// The rule of a code, in any case (`p0001`).
@@ -176,7 +185,8 @@ mod tests {
 
     #[test]
     fn codes_are_unique_ordered_and_of_their_table() {
-        for (table, letter) in [(syntax::TABLE, 'P'), (semantic::TABLE, 'S'), (types::TABLE, 'T')] {
+        for (table, letter) in [(syntax::TABLE, 'P'), (semantic::TABLE, 'S'), (types::TABLE, 'T'), (files::TABLE, 'F')]
+        {
             assert!(table.windows(2).all(|pair| pair[0].code < pair[1].code), "codes of table {letter} in order");
             for row in table {
                 assert_eq!(row.code.len(), 5);
