@@ -25,3 +25,4 @@ pub mod random;
 pub mod shrink;
 pub mod st;
 pub mod statistics;
+pub mod traces;

@@ -4,16 +4,22 @@
 //! [`evaluate`] runs the same tree by the page of the semantics alone: exact integers wrapped by type, operands from left to right, traps with the
 //! values that explain them. Where the page leaves something open (what of an assignment is evaluated first, whether inputs of a block
 //! are stored before a later argument traps) the generator makes no program that could tell. Loops end by construction: their counters belong to nobody else.
-//! [`shrink`] takes the tree apart as long as a difference stays.
+//! [`case`] adds what comes from outside, [`compare`] runs text and rounds in the engines, and [`shrink`] takes both apart as long as a difference stays.
 
 pub mod blocks;
+pub mod case;
+pub mod compare;
 mod declare;
 pub mod evaluate;
 mod expression;
+mod flow;
 pub mod functions;
 mod generate;
 pub mod print;
+pub mod reduce;
 pub mod shrink;
+mod sweep;
 pub mod tree;
+mod visit;
 
 pub use generate::generate;

@@ -94,7 +94,7 @@ fn quoted(bytes: &[u8]) -> String {
 }
 
 /// A literal, with its type before it if `typed`.
-fn literal(source: &Source, ty: Ty, value: &Value, typed: bool) -> String {
+pub(crate) fn literal(source: &Source, ty: Ty, value: &Value, typed: bool) -> String {
     let (prefix, plain) = match (ty, value) {
         (Ty::K(Kind::Bool), _) => return if value.int() == 0 { "FALSE" } else { "TRUE" }.to_string(),
         (Ty::K(Kind::Time), _) => return time(value.int()),

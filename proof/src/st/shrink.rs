@@ -1,36 +1,84 @@
 //! Makes a program that shows something smaller, as long as it still shows it.
+//!
+//! Coarse edits come first (rounds, runs of statements, whole branches and POUs), then fine ones (parameters, expressions, constants, types); all
+//! repeat until none helps. Nothing here knows whether an edited program is sound: one that the compiler refuses does not show what is looked for.
 
-use super::tree::{Arg, Expr, ExprKind, Kind, Place, Source, Step, Stmt, Ty, Value};
+use super::case::{Case, Round};
+use super::sweep::{drop_field, drop_inputs_of, drop_parameter, drop_values_of, take_out, unused, uses_field};
+use super::tree::{Arg, Class, Def, Expr, ExprKind, Kind, Place, Source, Step, Stmt, Ty, Value};
+use super::visit::{bodies, bodies_mut};
 
-/// Tries edits until none helps, at most `tries` of them; `shows` says whether a program still does what it is kept for.
+/// Makes a program small without rounds of its own.
 #[must_use]
 pub fn shrink(source: &Source, shows: &dyn Fn(&Source) -> bool, tries: usize) -> Source {
-    let mut best = source.clone();
-    let mut left = tries;
-    loop {
+    let case = Case { source: source.clone(), rounds: Vec::new() };
+    shrink_case(&case, &|case| shows(&case.source), tries).0.source
+}
+
+/// Tries edits until none helps, at most `tries` of them; `shows` says whether a case still does what it is kept for. Gives the smallest
+/// case and how many were tried.
+#[must_use]
+pub fn shrink_case(case: &Case, shows: &dyn Fn(&Case) -> bool, tries: usize) -> (Case, usize) {
+    let mut shrinker = Shrinker { best: case.clone(), shows, left: tries };
+    while shrinker.left > 0 {
         let mut helped = false;
-        let mut number = 0;
-        while left > 0 {
-            let mut edited = best.clone();
+        for stage in STAGES {
+            helped |= shrinker.stage(*stage);
+        }
+        if !helped {
+            break;
+        }
+    }
+    (shrinker.best, tries - shrinker.left)
+}
+
+type Stage = fn(&mut Editor, &mut Case);
+
+/// Coarse to fine.
+const STAGES: &[Stage] = &[
+    |editor, case| editor.rounds(&mut case.rounds),
+    |editor, case| editor.each_body(&mut case.source, Editor::chunks),
+    |editor, case| editor.each_body(&mut case.source, Editor::list),
+    |editor, case| {
+        let all = unused(&case.source);
+        if !all.is_empty() && editor.here() {
+            all.into_iter().for_each(|declaration| take_out(&mut case.source, declaration));
+        }
+    },
+    |editor, case| editor.declarations(&mut case.source),
+    |editor, case| editor.each_body(&mut case.source, Editor::values),
+    |editor, case| editor.types(case),
+];
+
+struct Shrinker<'s> {
+    best: Case,
+    shows: &'s dyn Fn(&Case) -> bool,
+    left: usize,
+}
+
+impl Shrinker<'_> {
+    /// Makes all edits of a stage, one after the other, and keeps those that help.
+    fn stage(&mut self, edits: Stage) -> bool {
+        let (mut helped, mut number) = (false, 0);
+        while self.left > 0 {
+            let mut edited = self.best.clone();
             let mut editor = Editor { number, done: false };
-            editor.source(&mut edited);
+            edits(&mut editor, &mut edited);
             if !editor.done {
                 break;
             }
-            left -= 1;
-            if shows(&edited) {
-                (best, helped) = (edited, true);
+            self.left -= 1;
+            if (self.shows)(&edited) {
+                (self.best, helped) = (edited, true);
             } else {
                 number += 1;
             }
         }
-        if !helped || left == 0 {
-            return best;
-        }
+        helped
     }
 }
 
-/// Walks the tree and makes edit number `number`.
+/// Walks a case and makes edit number `number`.
 struct Editor {
     number: usize,
     done: bool,
@@ -50,92 +98,256 @@ impl Editor {
         false
     }
 
-    fn source(&mut self, source: &mut Source) {
-        for unit in source.units.iter_mut().rev().filter(|unit| !unit.gone) {
-            self.list(&mut unit.body);
+    fn rounds(&mut self, rounds: &mut Vec<Round>) {
+        let last = rounds.len().saturating_sub(1);
+        if last > 0 && self.here() {
+            rounds.drain(..last);
+            return;
         }
-        let last = source.units.len().saturating_sub(1);
-        for unit in &mut source.units[..last] {
-            if !unit.gone && self.here() {
-                unit.gone = true;
-            }
-        }
-        for unit in &mut source.units {
-            for var in unit.vars.iter_mut().filter(|var| !var.gone && var.class != super::tree::Class::Return) {
-                if self.here() {
-                    var.gone = true;
-                }
-                if var.init.is_some() && self.here() {
-                    var.init = None;
-                }
-            }
-        }
-        for var in source.globals.iter_mut().filter(|var| !var.gone) {
+        for at in 0..last {
             if self.here() {
-                var.gone = true;
+                rounds.remove(at);
+                return;
             }
         }
-        for ty in source.types.iter_mut().filter(|ty| !ty.gone && !ty.name.is_empty()) {
-            if self.here() {
-                ty.gone = true;
+        for round in rounds {
+            if !round.inputs.is_empty() && self.here() {
+                round.inputs.clear();
+            }
+            for at in 0..round.inputs.len() {
+                if round.inputs.len() > 1 && self.here() {
+                    round.inputs.remove(at);
+                    return;
+                }
+            }
+            if round.wait_ns != 0 && self.here() {
+                round.wait_ns = 0;
             }
         }
     }
 
+    /// Shows every list of statements to `edits`, outer ones first, of later units first.
+    fn each_body(&mut self, source: &mut Source, edits: fn(&mut Editor, &mut Vec<Stmt>)) {
+        for unit in source.units.iter_mut().rev().filter(|unit| !unit.gone) {
+            self.nested(&mut unit.body, edits);
+        }
+    }
+
+    fn nested(&mut self, list: &mut Vec<Stmt>, edits: fn(&mut Editor, &mut Vec<Stmt>)) {
+        if self.done {
+            return;
+        }
+        edits(self, list);
+        for body in list.iter_mut().flat_map(bodies_mut) {
+            if self.done {
+                return;
+            }
+            self.nested(body, edits);
+        }
+    }
+
+    /// Runs of statements: all, then halves, quarters, to pairs.
+    fn chunks(&mut self, list: &mut Vec<Stmt>) {
+        let mut size = list.len();
+        while size >= 2 {
+            for start in (0..list.len()).step_by(size).rev() {
+                if self.here() {
+                    list.drain(start..list.len().min(start + size));
+                    return;
+                }
+            }
+            size = size.div_ceil(2).min(size - 1);
+        }
+    }
+
+    /// Single statements, what is in them in their place, and branches.
     fn list(&mut self, list: &mut Vec<Stmt>) {
         for at in (0..list.len()).rev() {
             if self.here() {
                 list.remove(at);
                 return;
             }
-            for inner in bodies(&list[at]) {
+            for inner in bodies(&list[at]).into_iter().filter(|body| !body.is_empty()).cloned().collect::<Vec<_>>() {
                 if self.here() {
                     list.splice(at..=at, inner);
                     return;
                 }
             }
-        }
-        for stmt in list {
-            self.stmt(stmt);
+            self.branches(&mut list[at]);
             if self.done {
                 return;
             }
         }
     }
 
-    fn stmt(&mut self, stmt: &mut Stmt) {
+    fn branches(&mut self, stmt: &mut Stmt) {
         match stmt {
-            Stmt::Assign(place, value) => {
-                self.place(place);
-                self.expr(value);
-            }
             Stmt::If(branches, otherwise) => {
-                for (condition, body) in branches.iter_mut() {
-                    self.expr(condition);
-                    self.list(body);
+                self.one_less(branches);
+                self.clear(otherwise);
+            }
+            Stmt::Case(_, branches, otherwise) => {
+                self.one_less(branches);
+                branches.iter_mut().for_each(|(labels, _)| self.one_less(labels));
+                self.clear(otherwise);
+            }
+            Stmt::For(_, _, _, by, _) => {
+                if by.is_some() && self.here() {
+                    *by = None;
                 }
-                self.list(otherwise);
             }
-            Stmt::Case(selector, branches, otherwise) => {
-                self.expr(selector);
-                branches.iter_mut().for_each(|(_, body)| self.list(body));
-                self.list(otherwise);
+            Stmt::While(_, limit, ..) | Stmt::Repeat(_, limit, ..) => {
+                if *limit > 1 && self.here() {
+                    *limit = 1;
+                }
             }
-            Stmt::For(_, from, to, by, body) => {
-                self.expr(from);
-                self.expr(to);
-                by.iter_mut().for_each(|by| self.expr(by));
-                self.list(body);
+            Stmt::Assign(..) | Stmt::Call(..) | Stmt::Exit | Stmt::Continue | Stmt::Return => {}
+        }
+    }
+
+    fn one_less<T>(&mut self, of: &mut Vec<T>) {
+        for at in 0..of.len() {
+            if of.len() > 1 && self.here() {
+                of.remove(at);
+                return;
             }
-            Stmt::While(_, _, condition, body) | Stmt::Repeat(_, _, condition, body) => {
-                self.expr(condition);
-                self.list(body);
+        }
+    }
+
+    fn clear(&mut self, list: &mut Vec<Stmt>) {
+        if !list.is_empty() && self.here() {
+            list.clear();
+        }
+    }
+
+    /// Declarations that nothing uses, parameters with their arguments, initial values.
+    fn declarations(&mut self, source: &mut Source) {
+        for declaration in unused(source) {
+            if self.here() {
+                take_out(source, declaration);
+                return;
             }
-            Stmt::Call(place, args) => {
-                self.place(place);
-                self.args(args);
+        }
+        for unit in 0..source.units.len() {
+            for at in 0..source.units[unit].vars.len() {
+                let var = &source.units[unit].vars[at];
+                let is_parameter = matches!(var.class, Class::Input | Class::Output | Class::InOut);
+                if is_parameter && !var.gone && !source.units[unit].gone && self.here() {
+                    drop_parameter(source, unit, at);
+                    return;
+                }
             }
-            Stmt::Exit | Stmt::Continue | Stmt::Return => {}
+        }
+        let own = source.units.iter_mut().filter(|unit| !unit.gone).flat_map(|unit| &mut unit.vars);
+        for var in own.chain(&mut source.globals).filter(|var| !var.gone) {
+            if var.init.is_some() && var.class != Class::Constant && self.here() {
+                var.init = None;
+            }
+            if let Some(init) = &mut var.init {
+                self.value(init);
+            }
+        }
+    }
+
+    /// Bounds of arrays, values of enumerations, fields of structures.
+    fn types(&mut self, case: &mut Case) {
+        let source = &mut case.source;
+        for id in 0..source.types.len() {
+            if source.types[id].gone && !matches!(source.types[id].def, Def::Array(..)) {
+                continue;
+            }
+            let mut def = source.types[id].def.clone();
+            let before = self.done;
+            match &mut def {
+                Def::Array(dims, _) => {
+                    for (low, high) in dims {
+                        if low < high && self.here() {
+                            *high = *low;
+                        }
+                        if i64::from(*low) + 1 < i64::from(*high) && self.here() {
+                            *high -= 1;
+                        }
+                    }
+                }
+                Def::Enum(values) => self.one_less(values),
+                Def::Struct(fields) => {
+                    for at in 0..fields.len() {
+                        if fields.len() > 1 && !uses_field(source, id, at) && self.here() {
+                            drop_field(source, id, at);
+                            drop_inputs_of(case, id);
+                            return;
+                        }
+                    }
+                }
+                Def::Subrange(..) | Def::Block(_) | Def::Standard(_) => {}
+            }
+            if self.done && !before {
+                // Initial values were made for what the type was.
+                source.types[id].def = def;
+                drop_values_of(source, id);
+                drop_inputs_of(case, id);
+                return;
+            }
+        }
+    }
+
+    /// A number nearer to 0.
+    fn value(&mut self, value: &mut Value) {
+        match value {
+            Value::Int(number) => {
+                for smaller in [0, 1, *number / 2] {
+                    if smaller.abs() < number.abs() && self.here() {
+                        *number = smaller;
+                        return;
+                    }
+                }
+            }
+            Value::Real(number) => {
+                let smaller = if *number == 1.0 { 0.0 } else { 1.0 };
+                if *number != 0.0 && self.here() {
+                    *number = smaller;
+                }
+            }
+            Value::Lreal(number) => {
+                let smaller = if *number == 1.0 { 0.0 } else { 1.0 };
+                if *number != 0.0 && self.here() {
+                    *number = smaller;
+                }
+            }
+            Value::Str(bytes) => {
+                if !bytes.is_empty() && self.here() {
+                    bytes.clear();
+                }
+            }
+            Value::Many(parts) => parts.iter_mut().for_each(|part| self.value(part)),
+        }
+    }
+
+    /// The expressions of statements, without those of statements in them.
+    fn values(&mut self, list: &mut Vec<Stmt>) {
+        for stmt in list {
+            match stmt {
+                Stmt::Assign(place, value) => {
+                    self.place(place);
+                    self.expr(value);
+                }
+                Stmt::If(branches, _) => branches.iter_mut().for_each(|(condition, _)| self.expr(condition)),
+                Stmt::Case(selector, ..) => self.expr(selector),
+                Stmt::For(_, from, to, by, _) => {
+                    self.expr(from);
+                    self.expr(to);
+                    by.iter_mut().for_each(|by| self.expr(by));
+                }
+                Stmt::While(_, _, condition, _) | Stmt::Repeat(_, _, condition, _) => self.expr(condition),
+                Stmt::Call(place, args) => {
+                    self.place(place);
+                    self.args(args);
+                }
+                Stmt::Exit | Stmt::Continue | Stmt::Return => {}
+            }
+            if self.done {
+                return;
+            }
         }
     }
 
@@ -163,17 +375,17 @@ impl Editor {
     }
 
     fn expr(&mut self, expr: &mut Expr) {
-        if let Ty::K(kind) = expr.ty
-            && !matches!(expr.kind, ExprKind::Lit(..))
-            && self.here()
-        {
-            let zero = match kind {
-                Kind::Real => Value::Real(1.0),
-                Kind::Lreal => Value::Lreal(1.0),
-                _ => Value::Int(1),
-            };
-            expr.kind = ExprKind::Lit(zero, true);
+        if let ExprKind::Lit(value, _) = &mut expr.kind {
+            if matches!(expr.ty, Ty::K(_) | Ty::S(_)) {
+                self.value(value);
+            }
             return;
+        }
+        for value in literals(expr.ty) {
+            if self.here() {
+                expr.kind = ExprKind::Lit(value, true);
+                return;
+            }
         }
         for part in parts(expr) {
             if part.ty == expr.ty && self.here() {
@@ -201,23 +413,31 @@ impl Editor {
     }
 }
 
-/// The lists of statements in a statement.
-fn bodies(stmt: &Stmt) -> Vec<Vec<Stmt>> {
-    let all: Vec<&Vec<Stmt>> = match stmt {
-        Stmt::If(branches, otherwise) => branches.iter().map(|(_, body)| body).chain([otherwise]).collect(),
-        Stmt::Case(_, branches, otherwise) => branches.iter().map(|(_, body)| body).chain([otherwise]).collect(),
-        Stmt::For(.., body) | Stmt::While(.., body) | Stmt::Repeat(.., body) => vec![body],
-        _ => Vec::new(),
-    };
-    all.into_iter().filter(|body| !body.is_empty()).cloned().collect()
+/// What may stand for an expression of a type.
+fn literals(ty: Ty) -> Vec<Value> {
+    match ty {
+        Ty::K(Kind::Real) => vec![Value::Real(1.0)],
+        Ty::K(Kind::Lreal) => vec![Value::Lreal(1.0)],
+        Ty::K(Kind::Bool) => vec![Value::Int(0), Value::Int(1)],
+        Ty::K(kind) => vec![Value::Int(0), Value::Int(1), Value::Int(kind.wrap(-1))],
+        Ty::S(_) => vec![Value::Str(Vec::new())],
+        Ty::N(_) => Vec::new(),
+    }
 }
 
 /// The expressions in an expression.
 fn parts(expr: &Expr) -> Vec<Expr> {
     match &expr.kind {
         ExprKind::Bin(_, left, right) => vec![(**left).clone(), (**right).clone()],
-        ExprKind::Neg(inner) | ExprKind::Not(inner) => vec![(**inner).clone()],
+        ExprKind::Neg(inner)
+        | ExprKind::Not(inner)
+        | ExprKind::Widen(inner)
+        | ExprKind::Conv(inner)
+        | ExprKind::Trunc(inner) => vec![(**inner).clone()],
         ExprKind::Std(_, inputs) => inputs.clone(),
-        _ => Vec::new(),
+        ExprKind::Call(_, args) => {
+            args.iter().filter_map(|arg| if let Arg::In(_, value) = arg { Some(value.clone()) } else { None }).collect()
+        }
+        ExprKind::Lit(..) | ExprKind::Get(_) => Vec::new(),
     }
 }

@@ -448,6 +448,31 @@ impl Source {
         }
     }
 
+    /// The type of the variable in which a place of a unit's code begins.
+    #[must_use]
+    pub fn base(&self, unit: &Unit, place: &Place) -> Ty {
+        match place.base {
+            Base::Var(at) => unit.vars[at].ty,
+            Base::Global(at) => self.globals[at].ty,
+        }
+    }
+
+    /// The type behind a step into a composite.
+    ///
+    /// # Panics
+    /// When there is nothing to step into: the tree is wrong.
+    #[must_use]
+    pub fn behind(&self, ty: Ty, step: &Step) -> Ty {
+        let Ty::N(id) = ty else { panic!("a step into {ty:?}") };
+        match (step, &self.types[id].def) {
+            (Step::Field(at), Def::Struct(fields)) => fields[*at].1,
+            (Step::Field(at), Def::Block(unit)) => self.units[*unit].vars[*at].ty,
+            (Step::Field(at), Def::Standard(standard)) => Ty::K(standard.fields()[*at].1),
+            (Step::Index(_), Def::Array(_, element)) => *element,
+            (step, def) => panic!("{step:?} into {def:?}"),
+        }
+    }
+
     /// Paths, types and values of all parts of a value that are no composites and that a dump shows.
     pub fn leaves(&self, path: &str, ty: Ty, value: &Value, found: &mut Vec<(String, Ty, Value)>) {
         let (Ty::N(id), Value::Many(parts)) = (ty, value) else {
