@@ -13,8 +13,9 @@
 //! The binary `khz` is in `src/main.rs`, a file for each subcommand in `src/cli/`.
 
 pub mod files;
+pub mod lockstep;
 pub mod pipeline;
 pub mod project;
 pub mod testing;
 
-pub use {khz_bytecode, khz_frontend, khz_interp, khz_jit, khz_machine, khz_scheduler};
+pub use {khz_bytecode, khz_frontend, khz_interp, khz_jit, khz_machine, khz_proof, khz_scheduler};

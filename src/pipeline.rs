@@ -24,6 +24,8 @@ pub struct Program {
     pub verified: Arc<Verified>,
     /// Bytes of the container file.
     pub container_bytes: usize,
+    /// VAR_INPUT of its program instances, as `instance.variable`; none when it was read from a container, which does not tell them apart.
+    pub inputs: Vec<String>,
 }
 
 /// What came of sources or a container that were not refused.
@@ -117,7 +119,10 @@ pub fn compile(sources: &[SourceInput], options: &CompileOptions) -> Result<Load
     if khz_frontend::diagnostics::has_errors(&compilation.diagnostics) {
         return Err(Refused::Diagnostics { diagnostics: compilation.diagnostics, sources: compilation.sources });
     }
-    let programs = compilation.resources.into_iter().map(|resource| program(resource.name, resource.container));
+    let programs = compilation.resources.into_iter().map(|resource| {
+        let inputs = resource.inputs;
+        program(resource.name, resource.container).map(|program| Program { inputs, ..program })
+    });
     let programs = programs.collect::<Result<_, _>>()?;
     Ok(Loaded { programs, diagnostics: compilation.diagnostics, sources: compilation.sources })
 }
@@ -130,14 +135,14 @@ pub(crate) fn program(name: String, container: Container) -> Result<Program, Ref
         file: format!("RESOURCE {name}, as compiled (a fault of khz: please report it)"),
         error: Box::new(error),
     })?;
-    Ok(Program { name, verified: Arc::new(verified), container_bytes: bytes.len() })
+    Ok(Program { name, verified: Arc::new(verified), container_bytes: bytes.len(), inputs: Vec::new() })
 }
 
 fn read(file: String, bytes: &[u8]) -> Result<Loaded, Refused> {
     let container = container::read(bytes).map_err(|error| Refused::Read { file: file.clone(), error })?;
     let verified = verify(container).map_err(|error| Refused::Verify { file: file.clone(), error: Box::new(error) })?;
     let name = verified.container().debug.as_ref().map_or(file, |debug| debug.resource_name.clone());
-    let program = Program { name, verified: Arc::new(verified), container_bytes: bytes.len() };
+    let program = Program { name, verified: Arc::new(verified), container_bytes: bytes.len(), inputs: Vec::new() };
     Ok(Loaded { programs: vec![program], diagnostics: Vec::new(), sources: SourceMap::new() })
 }
 

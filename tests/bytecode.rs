@@ -70,7 +70,8 @@ fn assembly_programs_do_the_same_in_both_engines() {
         let want = expected(&text);
         let container = assemble(&text).unwrap_or_else(|e| panic!("{name}: {e}"));
         let verified = verify(container).unwrap_or_else(|e| panic!("{name}: {e}"));
-        let program = Program { name: name.clone(), verified: Arc::new(verified), container_bytes: 0 };
+        let program =
+            Program { name: name.clone(), verified: Arc::new(verified), container_bytes: 0, inputs: Vec::new() };
         for fuel in [want.fuel, Some(want.fuel.unwrap_or(10_000_000))] {
             let [interp, jit] = EngineKind::BOTH.map(|kind| run(&program, kind, fuel, want.scans));
             assert_eq!(interp.0, jit.0, "{name}: how it ends");

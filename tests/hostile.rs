@@ -80,8 +80,12 @@ enum Fate {
 fn fate(bytes: &[u8]) -> Fate {
     let Ok(container) = container::read(bytes) else { return Fate::Unreadable };
     let Ok(verified) = verify(container) else { return Fate::Refused };
-    let program =
-        Program { name: String::new(), verified: std::sync::Arc::new(verified), container_bytes: bytes.len() };
+    let program = Program {
+        name: String::new(),
+        verified: std::sync::Arc::new(verified),
+        container_bytes: bytes.len(),
+        inputs: Vec::new(),
+    };
     let Ok(layout) = program.layout(16 << 20) else { return Fate::Refused };
     let deadline = DeadlineCell::new();
     let runs: Vec<_> = EngineKind::BOTH

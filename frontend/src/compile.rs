@@ -72,6 +72,8 @@ pub struct CompiledResource {
     pub name: String,
     /// What it is compiled to; not verified yet.
     pub container: Container,
+    /// VAR_INPUT of its program instances, as `instance.variable`: the container does not tell them from other variables.
+    pub inputs: Vec<String>,
 }
 
 /// What came of it.
@@ -142,7 +144,10 @@ fn run(inputs: &[SourceInput], options: &CompileOptions, only_checks: bool) -> C
         let hashes = lower::Hashes::of(inputs, &sources);
         for plan in &project.resources {
             match lower::lower(&project, plan, &ast.names, &sources, &hashes, options.strip) {
-                Ok(container) => resources.push(CompiledResource { name: plan.name.clone(), container }),
+                Ok(container) => {
+                    let inputs = plan.program_inputs(&project);
+                    resources.push(CompiledResource { name: plan.name.clone(), container, inputs });
+                }
                 Err(found) => diagnostics.push(*found),
             }
         }

@@ -181,6 +181,11 @@ impl Image {
     #[must_use]
     pub fn first_difference(&self, other: &Image) -> Option<u32> {
         let frames = self.layout.frames.first().map_or(0, |f| f.start)..self.layout.frames.last().map_or(0, |f| f.end);
+        let (before, behind) = (..frames.start as usize, frames.end as usize..);
+        // Images are equal nearly always, and then two comparisons of memory say so.
+        if self.bytes()[before] == other.bytes()[before] && self.bytes()[behind.clone()] == other.bytes()[behind] {
+            return None;
+        }
         let pairs = self.bytes().iter().zip(other.bytes()).enumerate();
         let mut differing = pairs.filter(|(_, (a, b))| a != b).map(|(at, _)| at as u32);
         differing.find(|at| !frames.contains(at))

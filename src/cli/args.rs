@@ -327,15 +327,28 @@ pub struct DiffArgs {
     #[command(flatten)]
     #[allow(missing_docs, reason = "clap would show it as help of the group")]
     pub sources: Sources,
-    /// Rounds to compare
-    #[arg(long, value_name = "N", default_value_t = 1000)]
-    pub scans: u64,
+    /// Rounds to compare (default 1000)
+    #[arg(long, value_name = "N")]
+    pub scans: Option<u64>,
+    /// Give the inputs new values each round: what is located at %I, or where nothing is, VAR_INPUT of the programs
+    #[arg(long, conflicts_with = "inputs")]
+    pub random_inputs: bool,
+    /// Seed of the random inputs (default 0); it asks for them
+    #[arg(long, value_name = "S", conflicts_with = "inputs")]
+    pub seed: Option<u64>,
     #[command(flatten)]
     #[allow(missing_docs, reason = "clap would show it as help of the group")]
     pub resource: ResourceArgs,
     #[command(flatten)]
     #[allow(missing_docs, reason = "clap would show it as help of the group")]
     pub common: Common,
+}
+
+impl DiffArgs {
+    /// Whether the inputs are random.
+    pub fn is_random(&self) -> bool {
+        self.random_inputs || self.seed.is_some()
+    }
 }
 
 /// How reserved words are written.

@@ -4,9 +4,7 @@ use std::sync::Arc;
 
 use khz_machine::image::Image;
 use khz_machine::variables::VariableTable;
-use khz_scheduler::{
-    Clock, Faulted, HoldsContainer, LoadError, LoadOptions, Resource, StopHandle, Stopped, VirtualClock,
-};
+use khz_scheduler::{Clock, Faulted, HoldsContainer, LoadError, LoadOptions, Resource, StopHandle, Stopped};
 use kilohertz::pipeline::{EngineKind, Program};
 
 use super::Status;
@@ -74,11 +72,6 @@ impl<'a> Session<'a> {
         };
         set_values(&self.names, resource.image_mut(), &self.args.set)?;
         Ok(Opened::Ready(resource))
-    }
-
-    /// Loads the resource on a virtual clock of its own.
-    pub fn open_virtual(&self, kind: EngineKind, fuel: bool) -> Result<Opened, Failure> {
-        self.open(kind, Box::new(VirtualClock::new()), fuel, None, None)
     }
 
     /// The rows of `--inputs`, checked against the image.

@@ -156,6 +156,18 @@ pub struct ResourcePlan {
     pub usage: Usage,
 }
 
+impl ResourcePlan {
+    /// VAR_INPUT of the program instances, as `instance.variable`.
+    pub fn program_inputs(&self, project: &Project) -> Vec<String> {
+        let inputs = self.instances.iter().flat_map(|instance| {
+            let info = project.pous.get(instance.program.0 as usize);
+            let inputs = info.into_iter().flat_map(|info| &info.vars).filter(|var| var.class == VarClass::Input);
+            inputs.map(move |var| format!("{}.{}", instance.name, var.name))
+        });
+        inputs.collect()
+    }
+}
+
 /// What the bodies of a resource use beyond declarations.
 #[derive(Debug, Default, Clone)]
 pub struct Usage {

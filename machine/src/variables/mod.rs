@@ -10,6 +10,7 @@ mod address;
 mod calendar;
 mod dump;
 mod literal;
+mod raw;
 mod resolve;
 mod scalar;
 
@@ -21,6 +22,7 @@ use khz_bytecode::limits::SLOT_BYTES;
 use khz_bytecode::value::BytePlace;
 
 pub use address::DirectAddress;
+pub use raw::Domain;
 pub use scalar::VariableValue;
 
 use crate::image::{Image, ImageLayout};

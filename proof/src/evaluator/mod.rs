@@ -30,19 +30,40 @@ pub struct Evaluator {
     layout: ImageLayout,
     charges_fuel: bool,
     executed: Executed,
+    watches: Vec<Watch>,
+}
+
+/// Bytes of the image whose writers are wanted.
+#[derive(Debug, Clone)]
+struct Watch {
+    bytes: Range<u32>,
+    /// The instruction that wrote them last, then the calls that led there, innermost first; empty: none did.
+    writer: Vec<CodePlace>,
 }
 
 impl Evaluator {
     /// For a resource; `layout` must be that of the images it will run on. With `charges_fuel`, [`Limits::fuel`] is looked at.
     #[must_use]
     pub fn new(verified: Arc<Verified>, layout: &ImageLayout, charges_fuel: bool) -> Self {
-        Evaluator { verified, layout: layout.clone(), charges_fuel, executed: Executed::default() }
+        Evaluator { verified, layout: layout.clone(), charges_fuel, executed: Executed::default(), watches: Vec::new() }
     }
 
     /// What it ran so far.
     #[must_use]
     pub fn executed(&self) -> &Executed {
         &self.executed
+    }
+
+    /// From now on, who writes to these bytes of the image is remembered; see [`Evaluator::writer`].
+    pub fn watch(&mut self, bytes: impl IntoIterator<Item = Range<u32>>) {
+        self.watches = bytes.into_iter().map(|bytes| Watch { bytes, writer: Vec::new() }).collect();
+    }
+
+    /// The instruction that last wrote to the watched bytes at `position` of [`Evaluator::watch`], and behind it the calls that led there, innermost first;
+    /// empty when none did. A write counts whatever it writes.
+    #[must_use]
+    pub fn writer(&self, position: usize) -> &[CodePlace] {
+        self.watches.get(position).map_or(&[], |watch| &watch.writer)
     }
 
     /// Image offsets of the slots and data block of a program instance.
@@ -83,6 +104,7 @@ impl Engine for Evaluator {
             stack: Vec::new(),
             calls: Vec::new(),
             executed: &mut self.executed,
+            watches: &mut self.watches,
         };
         let result = run.enter(function, frames.start, 0).and_then(|()| run.go());
         let result = result.map_err(|stop| run.trap(stop));
@@ -165,6 +187,7 @@ struct Run<'a> {
     stack: Vec<Item>,
     calls: Vec<Activation>,
     executed: &'a mut Executed,
+    watches: &'a mut [Watch],
 }
 
 impl Run<'_> {
@@ -172,11 +195,28 @@ impl Run<'_> {
         self.calls.last_mut().expect("a function runs")
     }
 
-    fn trap(&self, stop: Stop) -> Trap {
-        let mut places = self.calls.iter().rev().map(|call| {
+    /// Where it is, then the calls that led there, innermost first.
+    fn places(&self) -> impl Iterator<Item = CodePlace> + '_ {
+        self.calls.iter().rev().map(|call| {
             let offset = self.verified.function(call.function).instructions[call.at].offset;
             CodePlace { function: call.function, offset }
-        });
+        })
+    }
+
+    /// Notes that the running instruction writes `size` bytes at `at`.
+    fn writes(&mut self, at: u32, size: u32) {
+        let is_meant = |watch: &Watch| watch.bytes.start < at.saturating_add(size) && at < watch.bytes.end;
+        if !self.watches.iter().any(is_meant) {
+            return;
+        }
+        let places: Vec<CodePlace> = self.places().collect();
+        for watch in self.watches.iter_mut().filter(|watch| is_meant(watch)) {
+            watch.writer.clone_from(&places);
+        }
+    }
+
+    fn trap(&self, stop: Stop) -> Trap {
+        let mut places = self.places();
         let mut trap = Trap::new(stop.code, places.next().expect("a function ran"), stop.values);
         places.for_each(|place| trap.push_caller(place));
         trap

@@ -102,6 +102,7 @@ impl Run<'_> {
     fn store(&mut self, at: u32, storage: Storage, value: Value) {
         assert_eq!(storage.value_type(), value.value_type(), "a store of another type");
         assert!(at + storage.bytes() <= self.layout.input.start, "a store into %I");
+        self.writes(at, storage.bytes());
         store_scalar(self.bytes(at, storage.bytes()), storage, value);
     }
 
@@ -137,6 +138,7 @@ impl Run<'_> {
             }
             Instruction::StoreBit { place, offset, bit } => {
                 let (at, value) = (self.start_of(place) + offset, self.pop_i32());
+                self.writes(at, 1);
                 let byte = &mut self.bytes(at, 1)[0];
                 *byte = *byte & !(1 << bit) | (u8::from(value != 0) << bit);
             }
@@ -198,6 +200,7 @@ impl Run<'_> {
                 assert!(ty.write, "a copy to {ty}");
                 let size = self.size_of(target);
                 let bytes = self.bytes(source, size).to_vec();
+                self.writes(destination, size);
                 self.bytes(destination, size).copy_from_slice(&bytes);
             }
             _ => {}
@@ -243,6 +246,9 @@ impl Run<'_> {
                 }
                 (operand, item) => panic!("{item:?} where {operand:?} is due"),
             }
+        }
+        if let (Some(HelperOperand::Dst), Some(place)) = (op.operands().first(), places.first()) {
+            self.writes(place.at, u32::from(place.capacity) + 1);
         }
         let result = strings::apply(op, self.image, &places, &values);
         result.into_iter().for_each(|value| self.push(value));
