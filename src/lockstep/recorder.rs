@@ -74,7 +74,7 @@ impl Engine for Recorder {
         if runs.runs.is_empty() {
             runs.before.bytes_mut().copy_from_slice(image.bytes());
         }
-        let inner = fuel.as_mut().map(|fuel| &mut **fuel);
+        let inner = fuel.as_deref_mut();
         let result = self.engine.run(entry, image, Limits { deadline, fuel: inner, task_index });
         let left = fuel.map_or(0, |fuel: &mut Fuel| fuel.left);
         let used = given.unwrap_or(0).saturating_sub(left);
