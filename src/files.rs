@@ -6,12 +6,13 @@ use std::path::{Path, PathBuf};
 use khz_frontend::SourceInput;
 use khz_frontend::diagnostics::Diagnostic;
 use khz_frontend::source::SourceMap;
+use khz_frontend::twincat;
 
 use crate::project::{self, Settings};
 
 /// Largest source or container file that is read, in bytes.
 pub const MAX_FILE_BYTES: u64 = 1 << 30;
-/// Endings of source files that are picked up from a folder.
+/// Endings of plain source files that are picked up from a folder; TwinCAT's are known to the front end.
 const SOURCE_ENDINGS: [&str; 2] = ["st", "iecst"];
 /// First bytes of every container.
 const CONTAINER_MAGIC: [u8; 4] = 0x4950_4C43_u32.to_le_bytes();
@@ -158,7 +159,8 @@ pub(crate) fn is_project(path: &Path) -> bool {
 /// Whether a file's ending says that it is a source.
 pub(crate) fn is_source(path: &Path) -> bool {
     let ending = path.extension().and_then(|ending| ending.to_str());
-    ending.is_some_and(|ending| SOURCE_ENDINGS.iter().any(|known| ending.eq_ignore_ascii_case(known)))
+    let mut known = SOURCE_ENDINGS.iter().chain(&twincat::ENDINGS);
+    ending.is_some_and(|ending| known.any(|known| ending.eq_ignore_ascii_case(known)))
 }
 
 /// Adds all sources below a folder, by path.

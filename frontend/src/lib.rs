@@ -12,6 +12,7 @@
 //! - `analysis` finds out what names mean and makes the typed tree: every type and every conversion stands in it.
 //! - `lower` makes instructions of the typed tree; it never sees the syntax tree.
 //! - [`project`] reads a `khz.toml`: which files there are, and how they are compiled.
+//! - [`twincat`] takes Structured Text out of the XML that TwinCAT wraps it in.
 //! - [`testing`] makes programs of unit tests, which only [`compile_tests`] looks at.
 //! - [`compile()`] is all of it; [`check`] stops before the instructions.
 //! - [`diagnostics`] is one table of everything that can be said about a program.
@@ -47,6 +48,7 @@ pub mod project;
 pub mod source;
 pub mod syntax;
 pub mod testing;
+pub mod twincat;
 
 pub use compile::{
     Compilation, CompileOptions, CompiledResource, DefaultTask, Dialect, SourceInput, check, compile, compile_tests,

@@ -6,7 +6,8 @@
 //! Files come from users and so may be anything. Text is UTF-8; a file that is not is read as Latin-1 (older PLC tools
 //! write that), and a note says so; what cannot be text at all is refused with a diagnostic.
 
-use crate::diagnostics::{Diagnostic, syntax as rules};
+use crate::diagnostics::{Diagnostic, has_errors, syntax as rules};
+use crate::twincat;
 
 /// The largest source file that is read, in bytes.
 pub const MAX_FILE_BYTES: usize = 64 * 1024 * 1024;
@@ -90,12 +91,26 @@ pub struct SourceFile {
     text: String,
     /// Offset of the first byte of each line.
     line_starts: Vec<u32>,
+    /// What people see where the text was made of something else: line for line, column for column the same.
+    shown: Option<Box<SourceFile>>,
+    /// The name of the global variable list that this file is.
+    global_list: Option<String>,
 }
 
 impl SourceFile {
     /// The name under which messages show it.
     pub fn name(&self) -> &str {
         &self.name
+    }
+
+    /// The name of the global variable list that this file is: its globals are known as `NAME.x` too.
+    pub fn global_list(&self) -> Option<&str> {
+        self.global_list.as_deref()
+    }
+
+    /// A line (from 1) as people see it in their editor, without its line end.
+    pub fn shown_line(&self, line: u32) -> &str {
+        self.shown.as_deref().unwrap_or(self).line_text(line)
     }
 
     /// The decoded text.
@@ -143,7 +158,7 @@ impl SourceFile {
         let mut line_starts = vec![0];
         let ends = text.bytes().enumerate().filter(|&(_, byte)| byte == b'\n');
         line_starts.extend(ends.map(|(at, _)| u32::try_from(at + 1).unwrap_or(u32::MAX)));
-        Self { name, text, line_starts }
+        Self { name, text, line_starts, shown: None, global_list: None }
     }
 }
 
@@ -165,8 +180,18 @@ impl SourceMap {
     /// that comes back is an error (the file was refused) or a note (how it was read).
     pub fn add_bytes(&mut self, name: impl Into<String>, bytes: &[u8]) -> (FileId, Vec<Diagnostic>) {
         let id = self.next_id();
-        let (text, diagnostics) = decode(id, bytes);
-        self.files.push(SourceFile::new(name.into(), text));
+        let (text, mut diagnostics) = decode(id, bytes);
+        let name = name.into();
+        if twincat::is_twincat(&name) && !has_errors(&diagnostics) {
+            let found = twincat::structured_text(id, &text);
+            diagnostics.extend(found.diagnostics);
+            let mut file = SourceFile::new(name, found.text);
+            file.shown = Some(Box::new(SourceFile::new(String::new(), text)));
+            file.global_list = found.global_list;
+            self.files.push(file);
+        } else {
+            self.files.push(SourceFile::new(name, text));
+        }
         (id, diagnostics)
     }
 

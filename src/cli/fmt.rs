@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use khz_frontend::diagnostics::{Diagnostic, syntax};
 use khz_frontend::format::{FormatError, FormatOptions, KeywordCase, format};
 use khz_frontend::source::SourceMap;
+use khz_frontend::twincat;
 use kilohertz::files::{self, MAX_FILE_BYTES};
 use serde_json::{Value, json};
 
@@ -126,6 +127,10 @@ fn in_place(args: &FmtArgs) -> Outcome {
     let (mut changed, mut unchanged) = (0_usize, 0_usize);
     for path in files::list(&args.files)? {
         let name = path.display().to_string();
+        // TwinCAT keeps its XML in order by itself.
+        if twincat::is_twincat(&name) {
+            continue;
+        }
         let formatted = format_file(&path, &name, &options, args.check);
         match formatted {
             Formatted::Changed(_) => changed += 1,

@@ -139,7 +139,7 @@ impl<'a> Analyzer<'a> {
     /// The globals that a resource sees: an inner name hides an outer one.
     pub(super) fn environment(&self, configuration: Option<u32>, resource: Option<u32>) -> Environment {
         let mut seen: BTreeMap<Symbol, (u8, GlobalId)> = BTreeMap::new();
-        for (at, global) in (0u32..).zip(&self.globals) {
+        for (at, global) in (0u32..).zip(&self.globals).filter(|(_, global)| !global.qualified_only) {
             let rank = match (global.configuration, global.resource) {
                 (None, _) => 0,
                 (found, None) if found == configuration => 1,

@@ -8,12 +8,12 @@ use khz_bytecode::value::BytePlace;
 use super::call::is_eno;
 use super::tree::{GlobalId, GlobalInfo, Located, PouId, PouInfo, VarClass, VarId, VarInfo};
 use super::types::{BOOL, Const, FieldDef, Ty, TyKind, Value, elementary_by_name};
-use super::{Analyzer, ConstEntry, GlobalDecl, State, TypeEntry, TypeSource};
+use super::{Analyzer, ConstEntry, ConstKey, GlobalDecl, ListOf, State, TypeEntry, TypeSource};
 use crate::diagnostics::{Diagnostic, semantic as rules};
 use crate::source::Span;
 use crate::syntax::ast::{
-    AccessSize, Area, Declaration, DirectAddress, Ident, Pou, PouKind, Retention, TypeSpecKind, VarDecl, VarKind,
-    VarSection,
+    AccessSize, Area, Declaration, DirectAddress, Ident, Pou, PouKind, Retention, SourceUnit, TypeSpecKind, VarDecl,
+    VarKind, VarSection,
 };
 use crate::syntax::symbol::Symbol;
 
@@ -24,19 +24,10 @@ impl<'a> Analyzer<'a> {
     /// Collects all names, then resolves all declarations.
     pub(super) fn declare(&mut self) {
         let ast = self.ast;
-        for declaration in ast.declarations() {
-            match declaration {
-                Declaration::Type(decl) => {
-                    if let TypeSpecKind::Enum { values, .. } = &decl.spec.kind {
-                        for value in values {
-                            self.enum_owners.entry(value.name.symbol).or_default().push(decl.name.symbol);
-                        }
-                    }
-                    self.declare_type(&decl.name, TypeSource::Declared(decl));
-                }
-                Declaration::Pou(pou) => self.declare_pou(pou),
-                Declaration::Globals(section) => self.declare_globals(section, None, None),
-                Declaration::Configuration(_) => {}
+        for file in &ast.files {
+            let list = file.global_list.map(|name| ListOf { name, qualified_only: is_qualified_only(file) });
+            for declaration in &file.declarations {
+                self.declare_one(declaration, list);
             }
         }
         self.declare_configurations();
@@ -54,17 +45,33 @@ impl<'a> Analyzer<'a> {
         }
     }
 
+    fn declare_one(&mut self, declaration: &'a Declaration, list: Option<ListOf>) {
+        match declaration {
+            Declaration::Type(decl) => {
+                if let TypeSpecKind::Enum { values, .. } = &decl.spec.kind {
+                    for value in values {
+                        self.enum_owners.entry(value.name.symbol).or_default().push(decl.name.symbol);
+                    }
+                }
+                self.declare_type(&decl.name, TypeSource::Declared(decl));
+            }
+            Declaration::Pou(pou) => self.declare_pou(pou),
+            Declaration::Globals(section) => self.declare_globals(section, None, None, list),
+            Declaration::Configuration(_) => {}
+        }
+    }
+
     fn declare_configurations(&mut self) {
         let ast = self.ast;
         let (mut configuration, mut resource) = (0u32, 0u32);
         for declaration in ast.declarations() {
             let Declaration::Configuration(found) = declaration else { continue };
             for section in &found.globals {
-                self.declare_globals(section, Some(configuration), None);
+                self.declare_globals(section, Some(configuration), None, None);
             }
             for declared in &found.resources {
                 for section in &declared.globals {
-                    self.declare_globals(section, Some(configuration), Some(resource));
+                    self.declare_globals(section, Some(configuration), Some(resource), None);
                 }
                 resource += 1;
             }
@@ -131,13 +138,20 @@ impl<'a> Analyzer<'a> {
         for decl in &section.decls {
             for name in &decl.names {
                 let entry = ConstEntry { decl, state: State::Waiting };
-                self.constants.entry((scope, name.symbol)).or_insert(entry);
+                self.constants.entry(ConstKey::Named(scope, name.symbol)).or_insert(entry);
             }
         }
     }
 
-    fn declare_globals(&mut self, section: &'a VarSection, configuration: Option<u32>, resource: Option<u32>) {
-        if section.constant.is_some() {
+    fn declare_globals(
+        &mut self,
+        section: &'a VarSection,
+        configuration: Option<u32>,
+        resource: Option<u32>,
+        list: Option<ListOf>,
+    ) {
+        let qualified_only = list.is_some_and(|list| list.qualified_only);
+        if section.constant.is_some() && !qualified_only {
             self.declare_constants(section, None);
         }
         for decl in &section.decls {
@@ -146,27 +160,42 @@ impl<'a> Analyzer<'a> {
                     continue;
                 }
                 let id = GlobalId(u32::try_from(self.global_decls.len()).unwrap_or(u32::MAX));
-                let same = self.global_names.entry(name.symbol).or_default();
                 let decls = &self.global_decls;
-                let clash = same
-                    .iter()
-                    .map(|id| &decls[id.0 as usize])
-                    .find(|other| (other.configuration, other.resource) == (configuration, resource));
-                let clash = clash.map(|other| other.name.span);
-                same.push(id);
+                let mut clash = None;
+                if !qualified_only {
+                    let same = self.global_names.entry(name.symbol).or_default();
+                    let other = same
+                        .iter()
+                        .map(|id| &decls[id.0 as usize])
+                        .find(|other| (other.configuration, other.resource) == (configuration, resource));
+                    clash = other.map(|other| other.name.span);
+                    same.push(id);
+                }
+                if let Some(list) = list {
+                    let other = self.lists.entry(list.name.symbol).or_default().insert(name.symbol, id);
+                    clash = clash.or_else(|| other.map(|other| decls[other.0 as usize].name.span));
+                    if section.constant.is_some() {
+                        self.constants.insert(ConstKey::Listed(id), ConstEntry { decl, state: State::Waiting });
+                    }
+                }
                 if clash.is_some() {
                     self.report_twice(name, clash);
                 }
-                self.global_decls.push(GlobalDecl { section, decl, name: *name, configuration, resource });
+                self.global_decls.push(GlobalDecl { section, decl, name: *name, configuration, resource, list });
             }
         }
     }
 
     fn resolve_global(&mut self, found: GlobalDecl<'a>) -> GlobalInfo {
         let (ty, init) = self.declared_value(found.decl, found.name.symbol, None, found.section.constant.is_some());
+        let mut name = self.spelling(&found.name).to_owned();
+        if let Some(list) = found.list.filter(|list| list.qualified_only) {
+            name = format!("{}.{name}", self.spelling(&list.name));
+        }
         GlobalInfo {
             symbol: found.name.symbol,
-            name: self.spelling(&found.name).to_owned(),
+            name,
+            qualified_only: found.is_qualified_only(),
             span: found.name.span,
             configuration: found.configuration,
             resource: found.resource,
@@ -181,9 +210,9 @@ impl<'a> Analyzer<'a> {
     /// Type and initial value of a declared variable; through the table of constants when it is one.
     fn declared_value(&mut self, decl: &'a VarDecl, name: Symbol, scope: Option<PouId>, constant: bool) -> (Ty, Value) {
         if constant {
-            let entry = self.constants.get(&(scope, name)).map(|entry| std::ptr::eq(entry.decl, decl));
+            let entry = self.constants.get(&ConstKey::Named(scope, name)).map(|entry| std::ptr::eq(entry.decl, decl));
             if entry == Some(true) {
-                return self.constant_of(scope, name, decl.span).unwrap_or((Ty::Error, Value::Zero));
+                return self.constant_of(ConstKey::Named(scope, name), decl.span).unwrap_or((Ty::Error, Value::Zero));
             }
         }
         let (ty, default) = self.resolve_spec(&decl.ty, scope);
@@ -194,13 +223,18 @@ impl<'a> Analyzer<'a> {
     }
 
     /// Type and value of a CONSTANT, resolved when first asked for. `None`: there is none of this name in this scope.
-    pub(super) fn constant_of(&mut self, scope: Option<PouId>, name: Symbol, span: Span) -> Option<(Ty, Value)> {
-        let entry = self.constants.get_mut(&(scope, name))?;
+    pub(super) fn constant_of(&mut self, key: ConstKey, span: Span) -> Option<(Ty, Value)> {
+        let entry = self.constants.get_mut(&key)?;
         let decl = entry.decl;
+        let scope = match key {
+            ConstKey::Named(scope, _) => scope,
+            ConstKey::Listed(_) => None,
+        };
         match &entry.state {
             State::Done(done) => return Some(done.clone().unwrap_or((Ty::Error, Value::Zero))),
             State::Busy => {
-                let message = format!("the value of `{}` depends on itself", self.text(name));
+                let name = decl.names.first().map_or("", |name| self.spelling(name));
+                let message = format!("the value of `{name}` depends on itself");
                 self.report(&rules::RECURSIVE_CONSTANT, span, message);
                 return Some((Ty::Error, Value::Zero));
             }
@@ -213,7 +247,7 @@ impl<'a> Analyzer<'a> {
                 None => (ty, default),
             }
         });
-        if let Some(entry) = self.constants.get_mut(&(scope, name)) {
+        if let Some(entry) = self.constants.get_mut(&key) {
             entry.state = State::Done(value.clone());
         }
         Some(value.unwrap_or((Ty::Error, Value::Zero)))
@@ -456,6 +490,15 @@ fn new_var(name: &Ident, spelling: &str, ty: Ty, class: VarClass, init: Value) -
         retain: false,
         field: None,
     }
+}
+
+/// Whether the variables of a global variable list are known with its name before theirs only.
+fn is_qualified_only(file: &SourceUnit) -> bool {
+    let mut sections = file.declarations.iter().filter_map(|declaration| match declaration {
+        Declaration::Globals(section) => Some(section),
+        _ => None,
+    });
+    sections.any(|section| section.attributes.iter().any(|entry| entry.name.eq_ignore_ascii_case("qualified_only")))
 }
 
 fn is_retained(section: &VarSection) -> bool {

@@ -5,11 +5,11 @@ use std::rc::Rc;
 
 use khz_bytecode::container::ElementaryType as E;
 
-use super::Analyzer;
 use super::fold::{self, Unfolded};
 use super::testing::TestBody;
 use super::tree::{BinOp, Expr, ExprKind, GlobalId, PouId, PouInfo, Root, UnOp, Usage};
 use super::types::{BOOL, Const, Ty, TyKind, Value, is_bits, is_duration, is_integer, is_real, is_signed, is_unsigned};
+use super::{Analyzer, ConstKey};
 use crate::diagnostics::{semantic as names, types as rules};
 use crate::source::Span;
 use crate::syntax::ast::{self, Ident, LiteralValue};
@@ -116,6 +116,9 @@ impl<'c, 'a> Checker<'c, 'a> {
             ast::ExprKind::Literal(literal) => self.literal_expr(literal, span),
             ast::ExprKind::EnumValue { ty, value } => self.enum_value(ty, value, span),
             ast::ExprKind::Name(name) => self.name(expr, name, want),
+            ast::ExprKind::Member { base, member } if self.list_of(base).is_some() => {
+                self.listed_value(expr, base, member)
+            }
             ast::ExprKind::Direct(_)
             | ast::ExprKind::Member { .. }
             | ast::ExprKind::Index { .. }
@@ -212,9 +215,9 @@ impl<'c, 'a> Checker<'c, 'a> {
     }
 
     fn constant_name(&mut self, name: &Ident, span: Span, want: Ty) -> Expr {
-        let mut found = self.pou.and_then(|pou| self.an.constant_of(Some(pou), name.symbol, span));
+        let mut found = self.pou.and_then(|pou| self.an.constant_of(ConstKey::Named(Some(pou), name.symbol), span));
         if found.is_none() {
-            found = self.an.constant_of(None, name.symbol, span);
+            found = self.an.constant_of(ConstKey::Named(None, name.symbol), span);
         }
         match found {
             Some((Ty::Error, _)) => return broken(span),
@@ -238,6 +241,33 @@ impl<'c, 'a> Checker<'c, 'a> {
         let message = format!("`{}` is no constant", self.an.spelling(name));
         self.an.report(&names::NOT_CONSTANT, span, message);
         broken(span)
+    }
+
+    /// `LIST.x`: the value of a variable of a global variable list.
+    fn listed_value(&mut self, expr: &'a ast::Expr, base: &'a ast::Expr, member: &Ident) -> Expr {
+        let span = expr.span;
+        let Some(global) = self.list_of(base).and_then(|list| list.get(&member.symbol)).copied() else {
+            return self.load(expr);
+        };
+        let root = Root::Global(global);
+        if self.is_constant_context() {
+            return match self.an.constant_of(ConstKey::Listed(global), span) {
+                Some((Ty::Error, _)) => broken(span),
+                Some((ty, Value::Scalar(value))) => Expr { kind: ExprKind::Const(value), ty, span },
+                Some((ty, Value::Zero)) if self.zero(ty).is_some() => {
+                    let value = self.zero(ty).unwrap_or(Const::Int(0));
+                    Expr { kind: ExprKind::Const(value), ty, span }
+                }
+                _ => self.load(expr),
+            };
+        }
+        match self.constant_value(root) {
+            Some((ty, value)) => {
+                self.note_use(root, span);
+                Expr { kind: ExprKind::Const(value), ty, span }
+            }
+            None => self.load(expr),
+        }
     }
 
     /// Whether the unit declares this name, as anything.

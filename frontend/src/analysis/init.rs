@@ -2,10 +2,10 @@
 
 use std::rc::Rc;
 
-use super::Analyzer;
 use super::expr::Checker;
 use super::tree::PouId;
 use super::types::{Const, FieldDef, Ty, TyKind, Value};
+use super::{Analyzer, ConstKey};
 use crate::diagnostics::{semantic as rules, types as type_rules};
 use crate::source::Span;
 use crate::syntax::ast::{ArgKind, Expr, ExprKind, Init, InitElement, InitField, InitKind};
@@ -63,8 +63,8 @@ impl<'a> Analyzer<'a> {
     /// A CONSTANT array or structure as the initial value of another.
     fn whole_value(&mut self, expr: &'a Expr, ty: Ty, scope: Option<PouId>) -> Value {
         if let ExprKind::Name(name) = &expr.kind {
-            let found = match self.constant_of(scope, name.symbol, expr.span) {
-                None if scope.is_some() => self.constant_of(None, name.symbol, expr.span),
+            let found = match self.constant_of(ConstKey::Named(scope, name.symbol), expr.span) {
+                None if scope.is_some() => self.constant_of(ConstKey::Named(None, name.symbol), expr.span),
                 found => found,
             };
             match found {
@@ -155,8 +155,8 @@ impl<'a> Analyzer<'a> {
         let ExprKind::Name(name) = &callee.kind else { return None };
         let [arg] = args.as_slice() else { return None };
         let ArgKind::Positional(inner) = &arg.kind else { return None };
-        let known =
-            self.constants.contains_key(&(scope, name.symbol)) || self.constants.contains_key(&(None, name.symbol));
+        let mut keys = [scope, None].into_iter().map(|scope| ConstKey::Named(scope, name.symbol));
+        let known = keys.any(|key| self.constants.contains_key(&key));
         if !known {
             return None;
         }

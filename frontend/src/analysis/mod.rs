@@ -95,6 +95,23 @@ struct TypeEntry<'a> {
     span: Span,
 }
 
+/// Where a CONSTANT that declarations may use is known.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum ConstKey {
+    /// By its name, in a unit or everywhere.
+    Named(Option<PouId>, Symbol),
+    /// As a member of a global variable list.
+    Listed(GlobalId),
+}
+
+/// The global variable list that a declaration stands in.
+#[derive(Debug, Clone, Copy)]
+struct ListOf {
+    name: Ident,
+    /// `{attribute 'qualified_only'}`: its variables are known as `LIST.x` only.
+    qualified_only: bool,
+}
+
 /// A CONSTANT that declarations may use.
 #[derive(Debug)]
 struct ConstEntry<'a> {
@@ -121,10 +138,12 @@ struct Analyzer<'a> {
     pous: Vec<Option<Rc<PouInfo>>>,
     /// Names of each unit's variables.
     scopes: Vec<BTreeMap<Symbol, tree::VarId>>,
-    constants: BTreeMap<(Option<PouId>, Symbol), ConstEntry<'a>>,
+    constants: BTreeMap<ConstKey, ConstEntry<'a>>,
     globals: Vec<GlobalInfo>,
     global_names: BTreeMap<Symbol, Vec<GlobalId>>,
     global_decls: Vec<GlobalDecl<'a>>,
+    /// Global variable lists by name, each with its variables.
+    lists: BTreeMap<Symbol, BTreeMap<Symbol, GlobalId>>,
     depth: u32,
     suggestions: u32,
     /// Present when tests are compiled.
@@ -139,6 +158,14 @@ struct GlobalDecl<'a> {
     name: Ident,
     configuration: Option<u32>,
     resource: Option<u32>,
+    list: Option<ListOf>,
+}
+
+impl GlobalDecl<'_> {
+    /// Whether it is known as `LIST.x` only.
+    fn is_qualified_only(&self) -> bool {
+        self.list.is_some_and(|list| list.qualified_only)
+    }
 }
 
 impl<'a> Analyzer<'a> {
@@ -161,6 +188,7 @@ impl<'a> Analyzer<'a> {
             globals: Vec::new(),
             global_names: BTreeMap::new(),
             global_decls: Vec::new(),
+            lists: BTreeMap::new(),
             depth: 0,
             suggestions: 0,
             tests: None,

@@ -1,5 +1,7 @@
 //! Places: variables, fields, elements, bits, direct addresses.
 
+use std::collections::BTreeMap;
+
 use khz_bytecode::container::ElementaryType as E;
 use khz_bytecode::value::BytePlace;
 
@@ -40,6 +42,13 @@ impl<'a> Checker<'_, 'a> {
         known.extend(self.an.global_names.keys());
         known.extend(self.an.enum_owners.keys());
         let message = format!("`{}` is not declared", self.an.spelling(name));
+        let list = self.an.lists.iter().find(|(_, members)| members.contains_key(&name.symbol));
+        if let Some((list, _)) = list {
+            let list = self.an.ast.names.text_as_written(*list);
+            let help = format!("the global variable list {list} has it: `{list}.{}`", self.an.spelling(name));
+            self.an.push(Diagnostic::new(&names::UNKNOWN_NAME, name.span, message).help(help));
+            return;
+        }
         self.an.report_unknown(&names::UNKNOWN_NAME, name, message, known.into_iter());
     }
 
@@ -89,6 +98,9 @@ impl<'a> Checker<'_, 'a> {
                 self.note_image(located, self.an.types.extent(ty).0);
                 Some(Place { root: Root::Direct(located), path: Vec::new(), ty, span })
             }
+            ast::ExprKind::Member { base, member } if self.list_of(base).is_some() => {
+                self.listed_place(base, member, span)
+            }
             ast::ExprKind::Member { base, member } => {
                 let base = self.place_of_part(base)?;
                 self.member(base, member, span)
@@ -134,15 +146,45 @@ impl<'a> Checker<'_, 'a> {
             }
             return None;
         };
+        let found = self.root_place(root, span)?;
+        (!self.external_differs(name.symbol, found.ty)).then_some(found)
+    }
+
+    /// A whole variable, which is used here.
+    fn root_place(&mut self, root: Root, span: Span) -> Option<Place> {
         self.note_use(root, span);
         let ty = self.root_type(root);
         if let (Root::Global(_), Some(located)) = (root, self.root_location(root)) {
             self.note_image(located, self.an.types.extent(ty).0);
         }
-        if ty == Ty::Error || self.external_differs(name.symbol, ty) {
-            return None;
+        (ty != Ty::Error).then_some(Place { root, path: Vec::new(), ty, span })
+    }
+
+    /// The global variable list that a name means, where no variable has that name.
+    pub(super) fn list_of(&self, base: &ast::Expr) -> Option<&BTreeMap<Symbol, GlobalId>> {
+        let ast::ExprKind::Name(name) = &base.kind else { return None };
+        let list = self.an.lists.get(&name.symbol)?;
+        self.find_variable(name.symbol).is_none().then_some(list)
+    }
+
+    /// `LIST.x`: a variable of a global variable list.
+    fn listed_place(&mut self, base: &ast::Expr, member: &Ident, span: Span) -> Option<Place> {
+        let list = self.list_of(base)?;
+        let found = list.get(&member.symbol).copied();
+        let known: Vec<Symbol> = if found.is_none() { list.keys().copied().collect() } else { Vec::new() };
+        match found {
+            Some(_) if self.is_constant_context() => {
+                let message = format!("`{}` has no value when the program is compiled", self.an.spelling(member));
+                self.an.report(&names::NOT_CONSTANT, span, message);
+                None
+            }
+            Some(global) => self.root_place(Root::Global(global), span),
+            None => {
+                let message = format!("this global variable list has no variable `{}`", self.an.spelling(member));
+                self.an.report_unknown(&names::UNKNOWN_MEMBER, member, message, known.into_iter());
+                None
+            }
         }
-        Some(Place { root, path: Vec::new(), ty, span })
     }
 
     /// Whether the unit's VAR_EXTERNAL is of another type than its global, which was reported there.

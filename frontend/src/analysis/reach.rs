@@ -48,7 +48,7 @@ impl<'a> Analyzer<'a> {
     /// Units that no resource reaches still have to be sound; they see every global.
     fn check_rest(&mut self, checked: &BTreeSet<PouId>, calls: &mut BTreeMap<PouId, BTreeMap<PouId, Span>>) {
         let mut everything = Environment::new();
-        for (at, global) in (0u32..).zip(&self.globals) {
+        for (at, global) in (0u32..).zip(&self.globals).filter(|(_, global)| !global.qualified_only) {
             everything.entry(global.symbol).or_insert(GlobalId(at));
         }
         for at in 0..self.pou_decls.len() {

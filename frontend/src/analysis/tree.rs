@@ -112,6 +112,8 @@ pub struct GlobalInfo {
     pub configuration: Option<u32>,
     /// The resource that it belongs to; `None`: all of its configuration.
     pub resource: Option<u32>,
+    /// Known as `LIST.x` only, of its global variable list.
+    pub qualified_only: bool,
     /// Its type.
     pub ty: Ty,
     /// CONSTANT.

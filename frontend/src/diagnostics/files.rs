@@ -36,4 +36,28 @@ rules! {
         wrong ""
         right ""
     }
+    NOT_XML = "F0010" Error "this file is no XML that TwinCAT writes" {
+        "The file is cut off or damaged, has a document type, or has Structured Text outside of its CDATA sections. Save it again with TwinCAT."
+        in "Level.TcDUT"
+        wrong "<TcPlcObject><DUT Name=\"Level\"><Declaration><![CDATA[TYPE Level : INT; END_TYPE]]></Declaration></TcPlcObject>\n"
+        right "<TcPlcObject><DUT Name=\"Level\"><Declaration><![CDATA[TYPE Level : INT; END_TYPE]]></Declaration></DUT></TcPlcObject>\n"
+    }
+    NOT_TWINCAT = "F0011" Error "nothing of TwinCAT in this file" {
+        "A .TcPOU holds a POU that declares a PROGRAM, FUNCTION or FUNCTION_BLOCK, a .TcDUT a type, a .TcGVL a list of global variables."
+        in "Count.TcPOU"
+        wrong "<TcPlcObject><POU Name=\"Count\"><Declaration><![CDATA[VAR n : INT; END_VAR]]></Declaration></POU></TcPlcObject>\n"
+        right "<TcPlcObject><POU Name=\"Count\"><Declaration><![CDATA[PROGRAM Count VAR n : INT; END_VAR]]></Declaration><Implementation><ST><![CDATA[n := n + 1;]]></ST></Implementation></POU></TcPlcObject>\n"
+    }
+    OTHER_LANGUAGE = "F0012" Error "another language of the standard" {
+        "Kilohertz compiles Structured Text. Ladder, function block diagrams and sequential charts have to be written in it."
+        in "Count.TcPOU"
+        wrong "<TcPlcObject><POU Name=\"Count\"><Declaration><![CDATA[PROGRAM Count]]></Declaration><Implementation><NWL/></Implementation></POU></TcPlcObject>\n"
+        right "<TcPlcObject><POU Name=\"Count\"><Declaration><![CDATA[PROGRAM Count]]></Declaration><Implementation><ST><![CDATA[;]]></ST></Implementation></POU></TcPlcObject>\n"
+    }
+    PART_LATER = "F0013" Error "not of the language yet" {
+        "Methods, properties, actions, transitions and interfaces are not compiled yet. Write a FUNCTION or FUNCTION_BLOCK of its own."
+        in "Count.TcPOU"
+        wrong "<TcPlcObject><POU Name=\"Count\"><Declaration><![CDATA[PROGRAM Count]]></Declaration><Implementation><ST><![CDATA[;]]></ST></Implementation><Action Name=\"Reset\"><Implementation><ST><![CDATA[;]]></ST></Implementation></Action></POU></TcPlcObject>\n"
+        right "<TcPlcObject><POU Name=\"Count\"><Declaration><![CDATA[PROGRAM Count]]></Declaration><Implementation><ST><![CDATA[;]]></ST></Implementation></POU></TcPlcObject>\n"
+    }
 }

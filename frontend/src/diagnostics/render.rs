@@ -82,7 +82,7 @@ fn put(out: &mut String, text: std::fmt::Arguments<'_>) {
 fn excerpt(out: &mut String, sources: &SourceMap, span: Span, label: &str, style: Style, colour: &str) {
     let Some(file) = sources.file(span.file) else { return };
     let line = file.line_at(span.start);
-    let text = file.line_text(line);
+    let text = file.shown_line(line);
     if text.trim().is_empty() && label.is_empty() {
         return;
     }

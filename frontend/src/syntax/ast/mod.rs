@@ -54,6 +54,8 @@ impl Ast {
 pub struct SourceUnit {
     /// Which file.
     pub file: FileId,
+    /// The name of the global variable list that it is: its globals are known as `NAME.x` too.
+    pub global_list: Option<Ident>,
     /// What it declares, in order.
     pub declarations: Vec<Declaration>,
     /// Its unit tests.

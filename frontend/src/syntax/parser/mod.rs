@@ -48,7 +48,11 @@ pub fn parse(sources: &SourceMap) -> (Ast, Vec<Diagnostic>) {
     let mut heights = Vec::new();
     for (file, source) in sources.files() {
         let mut parser = Parser::new(file, source.text(), &mut ast.names, &mut heights, &mut diagnostics);
-        let unit = parser.source_unit();
+        let mut unit = parser.source_unit();
+        unit.global_list = source.global_list().map(|name| {
+            let spelling = ast.names.intern(name);
+            Ident { symbol: ast.names.fold(spelling), spelling, span: Span::new(file, 0, 0) }
+        });
         ast.files.push(unit);
     }
     ast.expr_count = u32::try_from(heights.len()).unwrap_or(u32::MAX);
@@ -433,7 +437,13 @@ impl<'a> Parser<'a> {
         let declarations = self.declarations();
         self.finish_pragmas();
         let tests = std::mem::take(&mut self.suite);
-        SourceUnit { file: self.file, declarations, tests, pragmas: std::mem::take(&mut self.loose_pragmas) }
+        SourceUnit {
+            file: self.file,
+            global_list: None,
+            declarations,
+            tests,
+            pragmas: std::mem::take(&mut self.loose_pragmas),
+        }
     }
 }
 
