@@ -2,6 +2,7 @@
 
 use khz_bytecode::container::Container;
 use khz_machine::library::blocks;
+use std::cell::Cell;
 use std::collections::BTreeSet;
 
 use crate::analysis;
@@ -103,10 +104,24 @@ pub fn compile_tests(sources: &[SourceInput], options: &CompileOptions) -> TestC
     on_large_stack(|| run_tests(sources, options))
 }
 
-fn on_large_stack<T: Send>(work: impl Fn() -> T + Sync) -> T {
+thread_local! {
+    /// Whether this thread has room for the front end.
+    static HAS_ROOM: Cell<bool> = const { Cell::new(false) };
+}
+
+/// Does `work` on a thread with room for sources of any depth. [`compile`], [`check`] and [`compile_tests`] do so by themselves; who has very many
+/// sources to look at calls them from here, and no thread is made for each.
+pub fn on_large_stack<T: Send>(work: impl Fn() -> T + Sync) -> T {
+    if HAS_ROOM.get() {
+        return work();
+    }
+    let with_room = || {
+        HAS_ROOM.set(true);
+        work()
+    };
     std::thread::scope(|scope| {
         let builder = std::thread::Builder::new().name("khz-frontend".to_owned()).stack_size(STACK_BYTES);
-        match builder.spawn_scoped(scope, &work) {
+        match builder.spawn_scoped(scope, with_room) {
             Ok(thread) => thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)),
             // No thread to be had: the caller's own stack does for programs of ordinary depth.
             Err(_) => work(),

@@ -52,5 +52,6 @@ pub mod twincat;
 
 pub use compile::{
     Compilation, CompileOptions, CompiledResource, DefaultTask, Dialect, SourceInput, check, compile, compile_tests,
+    on_large_stack,
 };
 pub use syntax::parser::parse;

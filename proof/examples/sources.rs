@@ -1,0 +1,94 @@
+//! Spoils Structured Text and checks it as `khz check` does, every diagnostic rendered: `sources FIRST_SEED COUNT [FOLDER]…`, from the repository's programs,
+//! generated ones, and those of further folders. A count of 1 writes the text to `source.st`.
+//!
+//! A panic, more than a second or more than 256 MiB for one source is a finding; its text is written to `source-SEED.st`.
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "a program for people")]
+
+#[path = "../tests/common/bases.rs"]
+mod bases;
+#[path = "../tests/common/checked.rs"]
+mod checked;
+#[path = "../tests/common/measure.rs"]
+mod measure;
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use checked::Checked;
+use khz_frontend::on_large_stack;
+use khz_proof::campaign::{Campaign, Figures, Finding, Report};
+use khz_proof::mutate::source::mutant;
+
+/// Generated programs among the texts.
+const GENERATED: u64 = 300;
+/// Sources that one thread looks at in a row.
+const BATCH: u64 = 250;
+
+#[derive(Default)]
+struct Seen {
+    checked: Checked,
+    costs: measure::Costs,
+    findings: Vec<Finding>,
+}
+
+impl Figures for Seen {
+    fn merge(&mut self, later: Self) {
+        self.checked.add(&later.checked);
+        self.costs.add(later.costs);
+        self.findings.extend(later.findings);
+    }
+}
+
+#[allow(clippy::disallowed_methods, reason = "wall time, for people")]
+fn main() {
+    let words: Vec<String> = std::env::args().skip(1).collect();
+    let number = |at: usize, other: u64| words.get(at).and_then(|word| word.parse().ok()).unwrap_or(other);
+    let (first, count) = (number(0, 0), number(1, 10_000));
+    let folders: Vec<PathBuf> = words.iter().skip(2).map(PathBuf::from).collect();
+    let texts = bases::texts(GENERATED, &folders);
+    println!("{} texts, {} bytes in all", texts.len(), texts.iter().map(Vec::len).sum::<usize>());
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    let start = Instant::now();
+    // A seed of the campaign is a batch of sources: so the front end's thread is made once for many, and their memory is counted where it is used.
+    let campaign = Campaign { first: 0, count: count.div_ceil(BATCH), threads, most_findings: 20 };
+    let report: Report<Seen> = campaign.run(
+        |batch, seen: &mut Seen| {
+            let seeds = first + batch * BATCH..first + ((batch + 1) * BATCH).min(count);
+            seen.merge(on_large_stack(|| look_at(&texts, seeds.clone())));
+            None
+        },
+        |progress| eprintln!("{} of {} batches", progress.done, progress.count),
+    );
+    let seen = report.figures;
+    if count == 1 {
+        // Who asks for one seed wants to see it.
+        let written = std::fs::write("source.st", mutant(&texts, first).bytes);
+        println!("source.st: {written:?}");
+    }
+    for finding in seen.findings.iter().chain(&report.findings).take(50) {
+        let path = format!("source-{}.st", finding.seed);
+        let mutant = mutant(&texts, finding.seed);
+        let written = std::fs::write(&path, &mutant.bytes);
+        println!("==== seed {}, {:?}: {} ({path}: {written:?})", finding.seed, mutant.kinds, finding.description);
+    }
+    println!("{}{}", seen.checked.report(), seen.costs.report());
+    let seconds = start.elapsed().as_secs_f64();
+    println!(
+        "{} findings in {} sources, {seconds:.1} s, {:.0} a second",
+        seen.findings.len() + report.findings.len(),
+        seen.checked.total,
+        seen.checked.total as f64 / seconds
+    );
+}
+
+fn look_at(texts: &[Vec<u8>], seeds: std::ops::Range<u64>) -> Seen {
+    let mut seen = Seen::default();
+    for seed in seeds {
+        let mutant = mutant(texts, seed);
+        let (result, cost) = measure::measure(|| checked::check(&mutant.bytes));
+        seen.costs.count(seed, cost);
+        let description = result.map(|codes| seen.checked.count(&mutant, &codes)).err().or_else(|| cost.finding());
+        seen.findings.extend(description.map(|description| Finding { seed, description }));
+    }
+    seen
+}

@@ -1,0 +1,64 @@
+//! The programs of this repository, as what mutants are made of.
+#![allow(dead_code, reason = "each user takes its part")]
+
+use std::path::{Path, PathBuf};
+
+use khz_bytecode::assembler::assemble;
+use khz_bytecode::container::{Container, strip};
+use khz_frontend::{CompileOptions, SourceInput, compile};
+use khz_proof::bytecode::generate;
+use khz_proof::mutate::Pool;
+use khz_proof::st;
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+/// Every file below a folder with one of these endings, by path. A folder that is not there has none.
+fn files(folder: &Path, endings: &[&str]) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    let mut folders = vec![folder.to_path_buf()];
+    while let Some(folder) = folders.pop() {
+        for path in std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path()) {
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|ending| endings.iter().any(|wanted| ending == *wanted)) {
+                found.push(path);
+            }
+        }
+    }
+    found.sort();
+    found
+}
+
+/// The Structured Text of the repository and of further folders, and `generated` programs of the generator.
+pub fn texts(generated: u64, further: &[PathBuf]) -> Vec<Vec<u8>> {
+    let own = ["tests/conformance", "tests/programs", "tests/st", "examples"].map(|folder| root().join(folder));
+    let paths = own.iter().chain(further).flat_map(|folder| files(folder, &["st"]));
+    let texts = paths.map(|path| std::fs::read(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display())));
+    texts.chain((0..generated).map(|seed| st::print::print(&st::generate(seed)).into_bytes())).collect()
+}
+
+/// Containers of all sizes: `generated` ones, the assembly texts of the tests, and the programs among the texts, every other one stripped.
+pub fn pool(generated: u64, texts: &[Vec<u8>]) -> Pool {
+    let assembly =
+        ["tests/bytecode", "bytecode/tests/verifier"].map(|folder| files(&root().join(folder), &["kasm", "khza"]));
+    let is_sound = |path: &&PathBuf| !path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('v'));
+    let assembled = assembly.iter().flatten().filter(is_sound).map(|path| {
+        let text = std::fs::read_to_string(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+        assemble(&text).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
+    });
+    let compiled = texts.iter().enumerate().flat_map(|(number, text)| {
+        let source = SourceInput { name: "base.st".into(), bytes: text.clone() };
+        let resources = compile(&[source], &CompileOptions::default()).resources;
+        resources.into_iter().map(move |resource| {
+            let mut container: Container = resource.container;
+            if number % 2 == 0 {
+                strip(&mut container);
+            }
+            container
+        })
+    });
+    let generated = (0..generated).map(|seed| generate(seed).container().clone());
+    Pool::new(assembled.chain(compiled).chain(generated))
+}
