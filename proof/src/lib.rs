@@ -22,6 +22,7 @@ pub mod evaluator;
 pub mod mutate;
 pub mod oracle;
 pub mod random;
+pub mod round_trip;
 pub mod shrink;
 pub mod st;
 pub mod statistics;

@@ -131,12 +131,59 @@ impl Difference {
 pub const FILE: &str = "main.st";
 
 /// One engine, and what it left behind.
-struct Side<'m> {
+pub(crate) struct Side<'m> {
     name: &'m str,
     engine: Box<dyn Engine>,
-    image: Image,
+    pub(crate) image: Image,
     /// The image after each round, and how the round ended.
     rounds: Vec<(Image, Result<(), Trap>)>,
+}
+
+impl<'m> Side<'m> {
+    /// An engine before its first round, with the initial values.
+    ///
+    /// # Errors
+    /// What the maker says.
+    pub(crate) fn new(
+        maker: &Maker<'m>,
+        verified: &Arc<Verified>,
+        layout: &ImageLayout,
+        with_fuel: bool,
+    ) -> Result<Side<'m>, String> {
+        let engine = (maker.make)(verified.clone(), layout, with_fuel)?;
+        let image = Image::new(layout.clone(), verified.container());
+        Ok(Side { name: maker.name, engine, image, rounds: Vec::new() })
+    }
+
+    /// Runs every program instance once, tasks by priority; before the first round what runs once. Gives how it ended.
+    pub(crate) fn round(&mut self, verified: &Verified, fuel: Option<u64>) -> Result<(), Trap> {
+        let result = self.entries(verified, fuel);
+        self.rounds.push((self.image.clone(), result));
+        result
+    }
+
+    fn entries(&mut self, verified: &Verified, fuel: Option<u64>) -> Result<(), Trap> {
+        let container = verified.container();
+        let mut entries: Vec<(Entry, usize)> = Vec::new();
+        if self.rounds.is_empty() {
+            entries.extend([(Entry::Init, 0), (Entry::Startup, 0)]);
+        }
+        let mut order: Vec<(u16, usize, usize)> = Vec::new();
+        for (index, instance) in container.tasks.instances.iter().enumerate() {
+            let task = container.tasks.tasks.iter().position(|task| task.id == instance.task).unwrap_or(0);
+            let priority = container.tasks.tasks.get(task).map_or(0, |task| task.priority);
+            order.push((priority, task, index));
+        }
+        order.sort_unstable();
+        entries.extend(order.into_iter().map(|(_, task, index)| (Entry::Instance(index), task)));
+        for (entry, task_index) in entries {
+            let deadline = DeadlineCell::new();
+            let mut tank = Fuel { left: fuel.unwrap_or(0) };
+            let limits = Limits { deadline: &deadline, fuel: fuel.map(|_| &mut tank), task_index };
+            self.engine.run(entry, &mut self.image, limits)?;
+        }
+        Ok(())
+    }
 }
 
 impl Bench<'_> {
@@ -175,13 +222,10 @@ impl Bench<'_> {
         rounds: &[Round],
         with_fuel: bool,
     ) -> Ran {
-        let first = Image::new(layout.clone(), verified.container());
         let mut sides = Vec::new();
         for maker in self.makers {
-            match (maker.make)(verified.clone(), layout, with_fuel) {
-                Ok(engine) => {
-                    sides.push(Side { name: maker.name, engine, image: first.clone(), rounds: Vec::new() });
-                }
+            match Side::new(maker, verified, layout, with_fuel) {
+                Ok(side) => sides.push(side),
                 Err(reason) => {
                     let broken = Difference::before_running("verifier", maker.name, Sort::Broken, reason);
                     return Ran::Different(Box::new(broken));
@@ -194,8 +238,7 @@ impl Bench<'_> {
             now = now.saturating_add(round.wait_ns);
             for side in &mut sides {
                 give(side, &names, verified.container(), round, now);
-                let result = run_round(side, verified, with_fuel.then_some(self.fuel));
-                side.rounds.push((side.image.clone(), result));
+                let _ = side.round(verified, with_fuel.then_some(self.fuel));
             }
             let Some((left, others)) = sides.split_first() else { return Ran::Equal };
             if let Some(right) = others.iter().find(|right| differ(left, right)) {
@@ -219,14 +262,7 @@ enum Ran {
 
 /// The time and the values from outside.
 fn give(side: &mut Side<'_>, names: &VariableTable, container: &Container, round: &Round, now: i64) {
-    for variable in &container.types.system_variables {
-        let value = match variable.kind {
-            SystemVariableKind::UpTime => now - now % 1_000_000,
-            SystemVariableKind::UpLtime => now,
-        };
-        let at = side.image.layout().slots.start as usize + variable.slot.index() * SLOT_BYTES as usize;
-        side.image.bytes_mut()[at..at + SLOT_BYTES as usize].copy_from_slice(&value.to_le_bytes());
-    }
+    set_time(&mut side.image, container, now);
     for input in &round.inputs {
         if let Ok(variable) = names.resolve(&input.name) {
             // A variable that the shrinker made narrower may not take a value; then it keeps its own, in every engine.
@@ -235,28 +271,16 @@ fn give(side: &mut Side<'_>, names: &VariableTable, container: &Container, round
     }
 }
 
-/// Runs every program instance once, tasks by priority; before the first round what runs once.
-fn run_round(side: &mut Side<'_>, verified: &Verified, fuel: Option<u64>) -> Result<(), Trap> {
-    let container = verified.container();
-    let mut entries: Vec<(Entry, usize)> = Vec::new();
-    if side.rounds.is_empty() {
-        entries.extend([(Entry::Init, 0), (Entry::Startup, 0)]);
+/// Gives the system variables a time in nanoseconds.
+pub(crate) fn set_time(image: &mut Image, container: &Container, now: i64) {
+    for variable in &container.types.system_variables {
+        let value = match variable.kind {
+            SystemVariableKind::UpTime => now - now % 1_000_000,
+            SystemVariableKind::UpLtime => now,
+        };
+        let at = image.layout().slots.start as usize + variable.slot.index() * SLOT_BYTES as usize;
+        image.bytes_mut()[at..at + SLOT_BYTES as usize].copy_from_slice(&value.to_le_bytes());
     }
-    let mut order: Vec<(u16, usize, usize)> = Vec::new();
-    for (index, instance) in container.tasks.instances.iter().enumerate() {
-        let task = container.tasks.tasks.iter().position(|task| task.id == instance.task).unwrap_or(0);
-        let priority = container.tasks.tasks.get(task).map_or(0, |task| task.priority);
-        order.push((priority, task, index));
-    }
-    order.sort_unstable();
-    entries.extend(order.into_iter().map(|(_, task, index)| (Entry::Instance(index), task)));
-    for (entry, task_index) in entries {
-        let deadline = DeadlineCell::new();
-        let mut tank = Fuel { left: fuel.unwrap_or(0) };
-        let limits = Limits { deadline: &deadline, fuel: fuel.map(|_| &mut tank), task_index };
-        side.engine.run(entry, &mut side.image, limits)?;
-    }
-    Ok(())
 }
 
 fn differ(left: &Side<'_>, right: &Side<'_>) -> bool {
