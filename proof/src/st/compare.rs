@@ -14,10 +14,11 @@ use khz_bytecode::verify::{Verified, verify};
 use khz_machine::engine::{DeadlineCell, Engine, Entry, Fuel, Limits};
 use khz_machine::image::{Image, ImageLayout};
 use khz_machine::report::{SourcePosition, describe};
-use khz_machine::trap::Trap;
+use khz_machine::trap::{CodePlace, Trap};
 use khz_machine::variables::{Variable, VariableTable};
 
 use super::case::Round;
+use crate::evaluator::Evaluator;
 use crate::oracle::Maker;
 use crate::traces::{ENDING, Row, Traces};
 
@@ -100,7 +101,9 @@ pub struct Difference {
     pub variable: Option<String>,
     /// What differs, for people.
     pub description: String,
-    /// The statement that made it, when it is known.
+    /// Where one of them trapped, if one did.
+    pub trapped: Option<CodePlace>,
+    /// The statement that made it: the one that trapped, or the one that wrote the variable last as the third evaluator runs it.
     pub statement: Option<Statement>,
     /// What both say of all variables, up to the difference.
     pub traces: Traces,
@@ -122,6 +125,7 @@ impl Difference {
             variable: None,
             description,
             statement: None,
+            trapped: None,
             traces: Traces::default(),
         }
     }
@@ -157,33 +161,38 @@ impl<'m> Side<'m> {
 
     /// Runs every program instance once, tasks by priority; before the first round what runs once. Gives how it ended.
     pub(crate) fn round(&mut self, verified: &Verified, fuel: Option<u64>) -> Result<(), Trap> {
-        let result = self.entries(verified, fuel);
+        let first = self.rounds.is_empty();
+        let result = run_round(&mut *self.engine, &mut self.image, verified, first, fuel);
         self.rounds.push((self.image.clone(), result));
         result
     }
+}
 
-    fn entries(&mut self, verified: &Verified, fuel: Option<u64>) -> Result<(), Trap> {
-        let container = verified.container();
-        let mut entries: Vec<(Entry, usize)> = Vec::new();
-        if self.rounds.is_empty() {
-            entries.extend([(Entry::Init, 0), (Entry::Startup, 0)]);
-        }
-        let mut order: Vec<(u16, usize, usize)> = Vec::new();
-        for (index, instance) in container.tasks.instances.iter().enumerate() {
-            let task = container.tasks.tasks.iter().position(|task| task.id == instance.task).unwrap_or(0);
-            let priority = container.tasks.tasks.get(task).map_or(0, |task| task.priority);
-            order.push((priority, task, index));
-        }
-        order.sort_unstable();
-        entries.extend(order.into_iter().map(|(_, task, index)| (Entry::Instance(index), task)));
-        for (entry, task_index) in entries {
-            let deadline = DeadlineCell::new();
-            let mut tank = Fuel { left: fuel.unwrap_or(0) };
-            let limits = Limits { deadline: &deadline, fuel: fuel.map(|_| &mut tank), task_index };
-            self.engine.run(entry, &mut self.image, limits)?;
-        }
-        Ok(())
+/// Runs every program instance once, tasks by priority; before the `first` round what runs once.
+fn run_round(
+    engine: &mut dyn Engine,
+    image: &mut Image,
+    verified: &Verified,
+    first: bool,
+    fuel: Option<u64>,
+) -> Result<(), Trap> {
+    let container = verified.container();
+    let mut entries = if first { vec![(Entry::Init, 0), (Entry::Startup, 0)] } else { Vec::new() };
+    let mut order: Vec<(u16, usize, usize)> = Vec::new();
+    for (index, instance) in container.tasks.instances.iter().enumerate() {
+        let task = container.tasks.tasks.iter().position(|task| task.id == instance.task).unwrap_or(0);
+        let priority = container.tasks.tasks.get(task).map_or(0, |task| task.priority);
+        order.push((priority, task, index));
     }
+    order.sort_unstable();
+    entries.extend(order.into_iter().map(|(_, task, index)| (Entry::Instance(index), task)));
+    for (entry, task_index) in entries {
+        let deadline = DeadlineCell::new();
+        let mut tank = Fuel { left: fuel.unwrap_or(0) };
+        let limits = Limits { deadline: &deadline, fuel: fuel.map(|_| &mut tank), task_index };
+        engine.run(entry, image, limits)?;
+    }
+    Ok(())
 }
 
 impl Bench<'_> {
@@ -237,12 +246,16 @@ impl Bench<'_> {
         for round in rounds {
             now = now.saturating_add(round.wait_ns);
             for side in &mut sides {
-                give(side, &names, verified.container(), round, now);
+                give(&mut side.image, &names, verified.container(), round, now);
                 let _ = side.round(verified, with_fuel.then_some(self.fuel));
             }
             let Some((left, others)) = sides.split_first() else { return Ran::Equal };
             if let Some(right) = others.iter().find(|right| differ(left, right)) {
-                return Ran::Different(Box::new(tell(left, right, &names, verified.container(), text)));
+                let mut difference = tell(left, right, &names, verified.container());
+                let place = difference.trapped.or_else(|| self.writer(verified, layout, rounds, &difference));
+                let source = place.and_then(|place| describe(place, verified.container()).source);
+                difference.statement = source.map(|place| Statement::at(place, text));
+                return Ran::Different(Box::new(difference));
             }
             match left.rounds.last() {
                 Some((_, Err(trap))) if trap.code == TrapCode::Watchdog => return Ran::OutOfFuel,
@@ -251,6 +264,30 @@ impl Bench<'_> {
             }
         }
         Ran::Equal
+    }
+
+    /// The instruction that wrote the differing variable last, as the third evaluator runs the same rounds.
+    fn writer(
+        &self,
+        verified: &Arc<Verified>,
+        layout: &ImageLayout,
+        rounds: &[Round],
+        difference: &Difference,
+    ) -> Option<CodePlace> {
+        let names = VariableTable::of(verified.container());
+        let variable = names.resolve(difference.variable.as_deref()?).ok()?;
+        let bytes = names.bytes_of(layout, &variable)?;
+        let mut evaluator = Evaluator::new(verified.clone(), layout, true);
+        // Offsets fit: an image is smaller than 2 GiB.
+        evaluator.watch([bytes.start as u32..bytes.end as u32]);
+        let mut image = Image::new(layout.clone(), verified.container());
+        let mut now = 0_i64;
+        for (number, round) in rounds.iter().enumerate().take(difference.round + 1) {
+            now = now.saturating_add(round.wait_ns);
+            give(&mut image, &names, verified.container(), round, now);
+            run_round(&mut evaluator, &mut image, verified, number == 0, Some(self.fuel)).ok()?;
+        }
+        evaluator.writer(0).first().copied()
     }
 }
 
@@ -261,12 +298,12 @@ enum Ran {
 }
 
 /// The time and the values from outside.
-fn give(side: &mut Side<'_>, names: &VariableTable, container: &Container, round: &Round, now: i64) {
-    set_time(&mut side.image, container, now);
+fn give(image: &mut Image, names: &VariableTable, container: &Container, round: &Round, now: i64) {
+    set_time(image, container, now);
     for input in &round.inputs {
         if let Ok(variable) = names.resolve(&input.name) {
             // A variable that the shrinker made narrower may not take a value; then it keeps its own, in every engine.
-            let _ = names.write(&mut side.image, &variable, &input.literal);
+            let _ = names.write(image, &variable, &input.literal);
         }
     }
 }
@@ -300,7 +337,7 @@ fn ending(result: &Result<(), Trap>, container: &Container) -> String {
 /// Most parts of one variable that a trace has.
 const MOST_PARTS: usize = 64;
 
-fn tell(left: &Side<'_>, right: &Side<'_>, names: &VariableTable, container: &Container, text: &str) -> Difference {
+fn tell(left: &Side<'_>, right: &Side<'_>, names: &VariableTable, container: &Container) -> Difference {
     let watched: Vec<Variable> =
         names.variables().filter(|one| !one.constant).flat_map(|one| names.leaves(&one, MOST_PARTS)).collect();
     let mut rows = Vec::new();
@@ -324,9 +361,7 @@ fn tell(left: &Side<'_>, right: &Side<'_>, names: &VariableTable, container: &Co
         (None, Some(row)) => (Sort::Value, format!("{} = {}; {}", row.name, row.left, row.right)),
         (None, None) => (Sort::Image, "the memory images differ where no variable lies".to_string()),
     };
-    let trapped = trap.and_then(|((_, a), (_, b))| a.err().or(b.err()));
-    let statement =
-        trapped.and_then(|trap| describe(trap.place, container).source).map(|place| Statement::at(place, text));
+    let trapped = trap.and_then(|((_, a), (_, b))| a.err().or(b.err())).map(|trap| trap.place);
     Difference {
         left: left.name.to_string(),
         right: right.name.to_string(),
@@ -334,7 +369,8 @@ fn tell(left: &Side<'_>, right: &Side<'_>, names: &VariableTable, container: &Co
         round,
         variable: first.map(|row| row.name),
         description,
-        statement,
+        statement: None,
+        trapped,
         traces,
     }
 }
