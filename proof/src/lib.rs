@@ -6,7 +6,8 @@
 //! [`bytecode`] makes containers that verify by construction, from a seed ([`random`]); [`evaluator`] is a third, slow, checked
 //! reading of the documents; [`oracle`] runs one container in all engines and names the first difference; [`shrink`] makes what differs small; [`mutate`] spoils
 //! container files to see whether the reader and the verifier let through anything that the engines then disagree about. [`st`] makes
-//! Structured Text together with its meaning, for the front end (`tests/st.rs`; `examples/st.rs` for long runs). [`statistics`]
+//! Structured Text together with its meaning, for the front end (`tests/st.rs`; `examples/st.rs` for long runs). [`schedule`] makes configurations
+//! of many tasks and foretells by a brute-force model what a scheduler must do with them. [`statistics`]
 //! counts what was reached, because a search that never went there proves nothing; [`campaign`] spreads many seeds over threads.
 //!
 //! The crate knows engines only as [`khz_machine::engine::Engine`]: its user hands it makers of them. So it depends on neither, and a
@@ -23,6 +24,7 @@ pub mod mutate;
 pub mod oracle;
 pub mod random;
 pub mod round_trip;
+pub mod schedule;
 pub mod shrink;
 pub mod st;
 pub mod statistics;

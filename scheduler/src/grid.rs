@@ -1,5 +1,6 @@
 //! Arithmetic of a cyclic task's grid (architecture §8). Pure.
 
+use khz_bytecode::canary::{Fault, planted};
 use khz_bytecode::container::OverrunPolicy;
 
 use crate::time::{DurationNs, TimeNs};
@@ -24,7 +25,8 @@ fn advance(due: TimeNs, interval: DurationNs, count: u64) -> TimeNs {
 #[must_use]
 pub fn collect(due: TimeNs, interval: DurationNs, now: TimeNs) -> Step {
     let missed = now.since(due).0 / interval.0.max(1);
-    Step { next_due: advance(due, interval, missed.saturating_add(1)), lost_cycles: missed, overrun: false }
+    let lost_cycles = if missed == 1 && planted(Fault::Scheduler) { 0 } else { missed };
+    Step { next_due: advance(due, interval, missed.saturating_add(1)), lost_cycles, overrun: false }
 }
 
 /// A cycle ended at `end` when `due` was its next due time. An end at the due time itself is no overrun.

@@ -22,7 +22,7 @@ enum Place {
 #[derive(Debug, Clone, Default)]
 pub struct SingleTable {
     rows: Vec<(TaskIndex, Place)>,
-    /// Whether some source lies in %I, where something outside can change it.
+    /// Whether a source of a task that can run lies in %I, where something outside can change it.
     reads_inputs: bool,
 }
 
@@ -39,7 +39,8 @@ impl SingleTable {
                 SingleSource::Slot(slot) => byte(layout.slots.start, u32::from(slot.0) * SLOT_BYTES, 0xff),
                 SingleSource::Data(offset) => byte(layout.data.start, offset, 0xff),
                 SingleSource::Bit { place, offset, bit } => {
-                    table.reads_inputs |= place == BytePlace::Input;
+                    // A task that never runs waits for nothing.
+                    table.reads_inputs |= place == BytePlace::Input && tasks.state(task).enabled;
                     // The verifier admits only places with a fixed start; another would read as FALSE for ever.
                     match layout.fixed_start(place) {
                         Some(start) => byte(start, offset, 1u8.checked_shl(u32::from(bit)).unwrap_or(0)),
@@ -75,7 +76,7 @@ impl SingleTable {
         self.rows.iter().map(|(task, _)| *task)
     }
 
-    /// Whether some source lies in %I.
+    /// Whether a source of a task that can run lies in %I.
     #[must_use]
     pub fn reads_inputs(&self) -> bool {
         self.reads_inputs

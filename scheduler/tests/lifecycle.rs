@@ -119,6 +119,19 @@ fn a_stopped_resource_goes_on_where_it_was() {
 }
 
 #[test]
+fn time_stands_still_from_the_stop_on_not_from_the_last_round_on() {
+    let mut hooks = Hooks { io: &mut NoIo, inputs: &mut NoInputs, observer: &mut NoObserver };
+    let (mut running, round) = counting().start().unwrap().run_round(&mut hooks).ok().unwrap();
+    assert_eq!(round.time, TimeNs::ZERO);
+    let wake = running.next_wake(&mut hooks);
+    running.wait(wake);
+    let stopped = running.stop();
+    assert_eq!(stopped.time(), TimeNs::ZERO, "no round has begun since");
+    let (_, round) = stopped.start().unwrap().run_round(&mut hooks).ok().unwrap();
+    assert_eq!((round.time, round.tasks), (TimeNs::from_us(10_000), 1));
+}
+
+#[test]
 fn traps_in_init_and_startup_fault_too() {
     let options = LoadOptions::default();
     let mut bad_init = container(&[cyclic(10_000, 0)]);

@@ -3,7 +3,7 @@
 mod common;
 
 use common::*;
-use khz_bytecode::container::SingleSource;
+use khz_bytecode::container::{SingleSource, Task};
 use khz_bytecode::value::BytePlace;
 use khz_scheduler::time::DurationNs;
 use khz_scheduler::*;
@@ -65,6 +65,19 @@ fn an_event_task_on_an_input_bit_is_polled() {
     assert_eq!(resource.rounds(), 12);
     // Virtual time knows only inputs that are known beforehand.
     assert!(matches!(make(Box::new(VirtualClock::new())), RunOutcome::NothingDue(_)));
+}
+
+#[test]
+fn a_disabled_task_polls_nothing() {
+    let single = SingleSource::Bit { place: BytePlace::Input, offset: 1, bit: 2 };
+    let (task, extension) = event(single, 0);
+    let disabled = (Task { enabled: false, ..task }, extension);
+    let clock = Box::new(MonotonicClock::new(DurationNs(0)));
+    let resource = load_with(container(&[disabled]), clock, &LoadOptions::default(), |_, _, _| Ok(())).unwrap();
+    let mut driver = Toggling { reads: 0 };
+    let mut hooks = Hooks { io: &mut driver, inputs: &mut NoInputs, observer: &mut NoObserver };
+    let outcome = run(resource.start().unwrap(), &mut hooks, RunOptions { scans: Some(1) });
+    assert!(matches!(outcome, RunOutcome::NothingDue(_)), "it would never end");
 }
 
 #[test]

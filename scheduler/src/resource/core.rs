@@ -40,6 +40,8 @@ pub(super) struct Core {
     pub guard: Arc<Guard>,
     /// Time of the last round.
     pub time: TimeNs,
+    /// Time at which it was stopped, and at which a start goes on.
+    paused: TimeNs,
     pub rounds: u64,
     pub rounds_with_tasks: u64,
     /// Image offsets of the up-time slots.
@@ -102,6 +104,7 @@ impl Core {
             image,
             guard,
             time: TimeNs::ZERO,
+            paused: TimeNs::ZERO,
             rounds: 0,
             rounds_with_tasks: 0,
             up_times,
@@ -127,8 +130,14 @@ impl Core {
         if let Some(function) = self.program.container().parameters.startup_function {
             self.run_once(Entry::Startup, function, FaultPlace::Startup)?;
         }
-        self.clock.start_at(self.time);
+        self.clock.start_at(self.paused);
         Ok(())
+    }
+
+    /// Lets time stand still until the next start.
+    pub fn pause(&mut self) {
+        // Measured cycles move the time of the last round, not the clock.
+        self.paused = self.clock.now().max(self.time);
     }
 
     /// Puts everything back to before the first round, then initialises.
@@ -145,6 +154,7 @@ impl Core {
             watch.late_cycles = 0;
         }
         self.time = TimeNs::ZERO;
+        self.paused = TimeNs::ZERO;
         self.rounds = 0;
         self.rounds_with_tasks = 0;
         if kind == ResetKind::Origin {
@@ -172,9 +182,11 @@ impl Core {
     /// Runs init or startup function, which is `function`, under its watchdog.
     fn run_once(&mut self, entry: Entry, function: FunctionId, place: FaultPlace) -> Result<(), Box<FaultReport>> {
         let limit = self.startup_watchdog;
-        self.clock.start_at(self.time);
+        // Time stands still; this is for the deadline alone.
+        self.clock.start_at(self.paused);
         let mut fuel = Fuel { left: limit.0 };
-        let deadline = self.clock.monotonic_ns(self.time.after(limit));
+        let end = self.paused.after(limit);
+        let deadline = self.clock.monotonic_ns(end);
         if let Some(deadline_ns) = deadline {
             self.guard.arm(deadline_ns);
         }
@@ -185,7 +197,7 @@ impl Core {
         };
         let mut outcome = self.engine.run(entry, &mut self.image, limits);
         let expired = self.guard.disarm();
-        if outcome.is_ok() && (expired || self.clock.now() > self.time.after(limit)) {
+        if outcome.is_ok() && (expired || (deadline.is_some() && self.clock.now() > end)) {
             // It ended by itself, but too late: no instruction is to blame more than another.
             outcome = Err(Trap::new(TrapCode::Watchdog, CodePlace { function, offset: 0 }, [0; 3]));
         }

@@ -37,7 +37,8 @@ impl Watch {
             return false;
         }
         self.late_cycles = self.late_cycles.saturating_add(1);
-        self.late_cycles >= self.sensitivity
+        // The limit counts for itself: whether a cycle that ran past it and then ended trips must not depend on when the monitor woke.
+        self.late_cycles >= self.sensitivity || used > self.limit
     }
 }
 
@@ -128,6 +129,14 @@ mod tests {
         assert_eq!(watch.limit, DurationNs(300));
         let trips: Vec<bool> = [150, 150, 100, 150, 150, 150].map(|used| watch.trips_after(DurationNs(used))).to_vec();
         assert_eq!(trips, [false, false, false, false, false, true]);
+    }
+
+    #[test]
+    fn one_cycle_over_the_whole_limit_trips_at_once() {
+        let mut watch = watch(100, 3, 0);
+        assert!(!watch.trips_after(DurationNs(300)));
+        watch.late_cycles = 0;
+        assert!(watch.trips_after(DurationNs(301)));
     }
 
     #[test]

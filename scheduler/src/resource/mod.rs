@@ -265,7 +265,9 @@ impl Resource<Running> {
     /// Ends running. Memory, time and due times stay as they are.
     #[must_use]
     pub fn stop(self) -> Resource<Stopped> {
-        Resource { core: self.core, state: Stopped(()) }
+        let mut core = self.core;
+        core.pause();
+        Resource { core, state: Stopped(()) }
     }
 
     /// Runs `cycles` cycles of one task and measures them: returns the nanoseconds of all of them together.

@@ -1,0 +1,25 @@
+//! Holds the scheduler against the model over many configurations of tasks, in both engines: `schedule FIRST_SEED COUNT [--threads N]
+//! [--findings N]`. What is not as the rules say is printed small.
+#![allow(clippy::print_stdout, reason = "a program for people")]
+
+#[path = "common/mod.rs"]
+mod common;
+#[path = "../tests/common/mod.rs"]
+mod engines;
+#[path = "../tests/common/schedule.rs"]
+mod oracle;
+
+use common::Arguments;
+use oracle::{Tally, check_seed};
+
+/// Questions that the shrinker may ask.
+const TRIES: usize = 1000;
+
+fn main() {
+    let arguments = Arguments::read(1000, &[]);
+    let report = arguments.search(|seed, tally: &mut Tally| check_seed(seed, &engines::makers(), tally, TRIES));
+    for finding in &report.findings {
+        println!("==== {}", finding.description);
+    }
+    println!("{}", report.figures.report());
+}
