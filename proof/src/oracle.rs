@@ -21,11 +21,31 @@ use crate::statistics::Statistics;
 pub type MakeEngine<'m> = dyn Fn(Arc<Verified>, &ImageLayout, bool) -> Result<Box<dyn Engine>, String> + 'm;
 
 /// An engine to compare.
+#[derive(Clone, Copy)]
 pub struct Maker<'m> {
     /// Its name in reports.
     pub name: &'m str,
     /// Makes it.
     pub make: &'m MakeEngine<'m>,
+    /// Which of its forms are compared.
+    pub forms: Forms,
+}
+
+impl<'m> Maker<'m> {
+    /// A maker whose engines are compared in both forms.
+    #[must_use]
+    pub fn new(name: &'m str, make: &'m MakeEngine<'m>) -> Self {
+        Maker { name, make, forms: Forms::Both }
+    }
+}
+
+/// The forms in which an engine is compared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Forms {
+    /// With fuel, and without where every run ends by itself.
+    Both,
+    /// Without fuel where every run ends by itself, otherwise with it: for a further engine that shall not cost as much.
+    One,
 }
 
 /// How to run a container.
@@ -152,10 +172,12 @@ pub fn compare(verified: &Arc<Verified>, makers: &[Maker<'_>], plan: &Plan, stat
     }
     note(statistics, &series, ended, verified, &evaluator);
     for maker in makers {
-        for with_fuel in [true, false] {
-            if !with_fuel && !ended {
-                continue;
-            }
+        let forms: &[bool] = match (maker.forms, ended) {
+            (Forms::Both, true) => &[true, false],
+            (Forms::One, true) => &[false],
+            (_, false) => &[true],
+        };
+        for with_fuel in forms.iter().copied() {
             let failure = match (maker.make)(verified.clone(), &layout, with_fuel) {
                 Err(reason) => Some(format!("it can not be made: {reason}")),
                 Ok(mut engine) => {
@@ -285,9 +307,11 @@ fn note(statistics: &mut Statistics, series: &[Vec<Step>], ended: bool, verified
     }
     statistics.executed.add(evaluator.executed());
     let facts = verified.facts();
+    let written = statistics.written.total();
     for placed in facts.functions.iter().flat_map(|function| &function.instructions) {
         statistics.written.ran(&placed.instruction);
     }
+    statistics.size((statistics.written.total() - written) as usize);
     let loops = || facts.functions.iter().flat_map(|function| &function.loops);
     statistics.feature("a FOR loop of proven control", loops().any(|found| found.control_is_proven));
     statistics.feature(

@@ -7,7 +7,7 @@ use khz_bytecode::container::{Constant, Container, ControlPlace, Function, Owner
 use khz_bytecode::disassembler::disassemble;
 use khz_bytecode::ids::{ForId, FunctionId, Label, SlotIndex};
 use khz_bytecode::instruction::{Instruction, Reader};
-use khz_bytecode::value::SlotPlace;
+use khz_bytecode::value::{SlotPlace, ValueType};
 use khz_bytecode::verify::{Verified, verify};
 
 use crate::bytecode::code::{encode, relabel};
@@ -44,6 +44,7 @@ impl Shrinker<'_> {
             for function in 0..best.container().functions.len() {
                 self.delete_ranges(&mut best, function);
                 self.decide(&mut best, function);
+                self.dissolve(&mut best, function);
                 self.delete_pairs(&mut best, function);
                 self.simplify(&mut best, function);
             }
@@ -162,6 +163,32 @@ impl Shrinker<'_> {
         }
     }
 
+    /// Puts drops of the operands and zeros as results in the place of what has effects, and then deletes what pushed the operands. Undone where that
+    /// leaves no less than before.
+    fn dissolve(&mut self, best: &mut Verified, function: usize) {
+        let before = best.clone();
+        let mut has_changed = false;
+        for at in (0..instructions_of(&best.container().functions[function]).len()).rev() {
+            has_changed |= self.attempt(best, |container| {
+                let instruction = instructions_of(&container.functions[function]).swap_remove(at);
+                let Some((operands, results)) = stack_effect(container, &instruction) else { return };
+                let mut others = vec![Instruction::Drop {}; operands];
+                others.extend(results.into_iter().filter_map(|ty| zero(container, ty)));
+                let come = others.len();
+                change_code(&mut container.functions[function], |code| {
+                    code.splice(at..=at, others);
+                    (at, 1, come)
+                });
+            });
+        }
+        if has_changed {
+            self.delete_pairs(best, function);
+            if weight(best.container()) >= weight(before.container()) {
+                *best = before;
+            }
+        }
+    }
+
     /// Deletes what pushes a value and, further on, the `drop` that takes it away; what computes with values becomes drops first.
     fn delete_pairs(&mut self, best: &mut Verified, function: usize) {
         const FARTHEST: usize = 12;
@@ -171,6 +198,10 @@ impl Shrinker<'_> {
                 Instruction::Select {} => 2,
                 Instruction::Numeric(op) => op.operands().len() - 1,
                 Instruction::RefField { .. } => 0,
+                Instruction::RefIndex { array } => {
+                    let array = best.container().types.arrays.get(array.index());
+                    array.map_or(usize::MAX, |array| array.dimensions.len())
+                }
                 _ => usize::MAX,
             };
             if spare != usize::MAX {
@@ -342,13 +373,12 @@ fn drop_dead(function: &mut Function) -> bool {
     dropped
 }
 
-fn zero(container: &mut Container, ty: khz_bytecode::value::ValueType) -> Option<Instruction> {
+fn zero(container: &mut Container, ty: ValueType) -> Option<Instruction> {
     constant_of(container, ty, 0)
 }
 
 /// An instruction that pushes 0 or 1 of a type.
-fn constant_of(container: &mut Container, ty: khz_bytecode::value::ValueType, value: u8) -> Option<Instruction> {
-    use khz_bytecode::value::ValueType;
+fn constant_of(container: &mut Container, ty: ValueType, value: u8) -> Option<Instruction> {
     let constant = match ty {
         ValueType::I32 => return Some(Instruction::ConstI32 { value: i32::from(value) }),
         ValueType::I64 => Constant::I64(i64::from(value)),
@@ -362,6 +392,26 @@ fn constant_of(container: &mut Container, ty: khz_bytecode::value::ValueType, va
     khz_bytecode::ids::ConstantId::from_index(position).map(|id| Instruction::Const { id })
 }
 
+/// How many entries of the stack an instruction with effects takes, and the values that it leaves.
+fn stack_effect(container: &Container, instruction: &Instruction) -> Option<(usize, Vec<ValueType>)> {
+    Some(match instruction {
+        Instruction::Call { function } => {
+            let callee = container.functions.get(function.index())?;
+            let this = usize::from(matches!(callee.owner, Owner::Block(_)));
+            (callee.parameter_types().len() + this, callee.results.clone())
+        }
+        Instruction::CallVirtual { method } => {
+            let signature = container.types.methods.get(method.index())?;
+            (signature.parameters.len() + 1, signature.results.clone())
+        }
+        Instruction::Helper(op, _) => (op.operands().len(), op.result().into_iter().collect()),
+        Instruction::RefLoad { storage } => (1, vec![storage.value_type()]),
+        Instruction::RefStore { .. } | Instruction::Copy { .. } => (2, Vec::new()),
+        Instruction::SlotStore { .. } | Instruction::Store { .. } | Instruction::StoreBit { .. } => (1, Vec::new()),
+        _ => return None,
+    })
+}
+
 /// Puts a constant of a type that fits in the place of `span` instructions.
 fn replace_by_constant(container: &mut Container, function: usize, at: usize, span: usize, value: u8) {
     let code = instructions_of(&container.functions[function]);
@@ -369,8 +419,8 @@ fn replace_by_constant(container: &mut Container, function: usize, at: usize, sp
     let ty = match last {
         Instruction::Numeric(op) => op.result(),
         Instruction::Load { storage, .. } | Instruction::RefLoad { storage } => storage.value_type(),
-        Instruction::LoadBit { .. } => khz_bytecode::value::ValueType::I32,
-        Instruction::RefToInt {} => khz_bytecode::value::ValueType::I64,
+        Instruction::LoadBit { .. } => ValueType::I32,
+        Instruction::RefToInt {} => ValueType::I64,
         Instruction::SlotLoad { place, index } => match slot_type(container, function, *place, *index) {
             Some(ty) => ty,
             None => return,
@@ -388,12 +438,7 @@ fn replace_by_constant(container: &mut Container, function: usize, at: usize, sp
     });
 }
 
-fn slot_type(
-    container: &Container,
-    function: usize,
-    place: SlotPlace,
-    index: SlotIndex,
-) -> Option<khz_bytecode::value::ValueType> {
+fn slot_type(container: &Container, function: usize, place: SlotPlace, index: SlotIndex) -> Option<ValueType> {
     use khz_bytecode::value::LocalType;
     let function = &container.functions[function];
     let storage = match (place, function.owner) {

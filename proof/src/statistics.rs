@@ -11,12 +11,16 @@ use crate::campaign::Figures;
 /// Opcodes lie below this.
 const OPCODES: usize = 0x400;
 
-/// Names of every instruction, by opcode.
-fn names() -> BTreeMap<usize, &'static str> {
-    let control = ControlOp::ALL.iter().map(|op| (*op as usize, op.mnemonic()));
-    let numeric = NumericOp::ALL.iter().map(|op| (*op as usize, op.mnemonic()));
-    let helpers = HelperOp::ALL.iter().map(|op| (*op as usize, op.mnemonic()));
-    control.chain(numeric).chain(helpers).collect()
+/// A kind of instructions: what it is called, and the opcode and name of each.
+type Kind = (&'static str, Vec<(usize, &'static str)>);
+
+/// Every instruction by its kind. The last kind is the standard functions on strings.
+fn kinds() -> [Kind; 3] {
+    [
+        ("control and memory", ControlOp::ALL.iter().map(|op| (*op as usize, op.mnemonic())).collect()),
+        ("numeric", NumericOp::ALL.iter().map(|op| (*op as usize, op.mnemonic())).collect()),
+        ("helper", HelperOp::ALL.iter().map(|op| (*op as usize, op.mnemonic())).collect()),
+    ]
 }
 
 /// How often each instruction was met, and each trap.
@@ -62,7 +66,21 @@ impl Executed {
     /// Names of instructions that were met less than `least` times.
     #[must_use]
     pub fn rare(&self, least: u64) -> Vec<&'static str> {
-        names().into_iter().filter(|(opcode, _)| self.counts[*opcode] < least).map(|(_, name)| name).collect()
+        let all = kinds().into_iter().flat_map(|(_, instructions)| instructions);
+        all.filter(|(opcode, _)| self.counts[*opcode] < least).map(|(_, name)| name).collect()
+    }
+
+    /// A line for each kind of instructions: how many of them were met, and which one least.
+    fn coverage(&self) -> String {
+        let mut text = String::new();
+        for (kind, instructions) in kinds() {
+            let met = instructions.iter().filter(|(opcode, _)| self.counts[*opcode] > 0).count();
+            let least = instructions.iter().map(|(opcode, name)| (self.counts[*opcode], *name)).min();
+            let (count, name) = least.unwrap_or_default();
+            // A String takes everything.
+            let _ = writeln!(text, "{kind} instructions: {met} of {}, least {name}: {count}", instructions.len());
+        }
+        text
     }
 
     /// How often a trap was met.
@@ -89,6 +107,16 @@ pub struct Statistics {
     pub written: Executed,
     /// How many programs have each property.
     pub features: BTreeMap<&'static str, u64>,
+    /// In how many programs each pass of native code changed something.
+    pub passes: BTreeMap<&'static str, u64>,
+    /// How many programs have about so many instructions: less than the key, and at least half of it.
+    pub sizes: BTreeMap<usize, u64>,
+}
+
+fn add<K: Ord>(counts: &mut BTreeMap<K, u64>, later: BTreeMap<K, u64>) {
+    for (key, count) in later {
+        *counts.entry(key).or_default() += count;
+    }
 }
 
 impl Figures for Statistics {
@@ -99,9 +127,9 @@ impl Figures for Statistics {
         self.trapped += later.trapped;
         self.executed.add(&later.executed);
         self.written.add(&later.written);
-        for (name, count) in later.features {
-            *self.features.entry(name).or_default() += count;
-        }
+        add(&mut self.features, later.features);
+        add(&mut self.passes, later.passes);
+        add(&mut self.sizes, later.sizes);
     }
 }
 
@@ -109,6 +137,16 @@ impl Statistics {
     /// Counts a program that has a property.
     pub fn feature(&mut self, name: &'static str, has: bool) {
         *self.features.entry(name).or_default() += u64::from(has);
+    }
+
+    /// Counts a program in which a pass changed something, or not.
+    pub fn pass(&mut self, name: &'static str, has_fired: bool) {
+        *self.passes.entry(name).or_default() += u64::from(has_fired);
+    }
+
+    /// Counts a program by its size.
+    pub fn size(&mut self, instructions: usize) {
+        *self.sizes.entry((instructions + 1).next_power_of_two()).or_default() += 1;
     }
 
     /// The figures as text.
@@ -127,14 +165,20 @@ impl Statistics {
             self.trapped * 100 / runs
         );
         let _ = writeln!(text, "instructions executed {}, written {}", self.executed.total(), self.written.total());
+        for (below, count) in &self.sizes {
+            let _ = writeln!(text, "programs of {} to {} instructions: {count}", below / 2, below - 1);
+        }
+        text.push_str(&self.executed.coverage());
         for code in TrapCode::ALL {
             let _ = writeln!(text, "trap {}: {}", code.name(), self.executed.trap_count(*code));
         }
         for (name, count) in &self.features {
             let _ = writeln!(text, "programs with {name}: {count}");
         }
+        for (name, count) in &self.passes {
+            let _ = writeln!(text, "programs in which pass {name} changed something: {count}");
+        }
         let _ = writeln!(text, "never executed: {:?}", self.executed.rare(1));
-        let _ = writeln!(text, "executed less than 100 times: {:?}", self.executed.rare(100));
         text
     }
 }

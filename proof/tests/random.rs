@@ -4,31 +4,42 @@ mod common;
 
 use std::sync::Arc;
 
+use common::Engines;
 use khz_bytecode::trap::TrapCode;
 use khz_jit::Passes;
 use khz_proof::bytecode::generate;
+use khz_proof::campaign::{Campaign, Report};
 use khz_proof::oracle::{Maker, Plan, compare};
 use khz_proof::statistics::Statistics;
 
 /// How many programs; `examples/compare.rs` runs more.
-const PROGRAMS: u64 = 600;
+const PROGRAMS: u64 = 12_000;
+/// Scans of each.
+const SCANS: u32 = 10;
 
 #[test]
 fn random_programs_do_the_same_in_every_engine() {
-    let mut statistics = Statistics::default();
-    let makers = common::makers();
-    for seed in 0..PROGRAMS {
-        let verified = Arc::new(generate(seed));
-        let plan = Plan { seed, ..Plan::default() };
-        let difference = compare(&verified, &makers, &plan, &mut statistics).difference();
-        if let Some(difference) = difference {
-            panic!("seed {seed}: {}", difference.description);
-        }
-    }
+    let campaign = Campaign { first: 0, count: PROGRAMS, threads: 2, most_findings: 1 };
+    let look = |seed: u64, statistics: &mut Statistics| {
+        let plan = Plan { seed, scans: SCANS, ..Plan::default() };
+        let engines = Engines::of_seed(seed);
+        let found = compare(&Arc::new(generate(seed)), &engines.makers(), &plan, statistics).difference();
+        engines.note(statistics);
+        found.map(|found| found.description)
+    };
+    let Report { findings, figures: statistics, .. } = campaign.run(look, |_| ());
+    assert_eq!(findings, []);
     let report = statistics.report();
-    assert_eq!(statistics.executed.rare(20), Vec::<&str>::new(), "every instruction runs: {report}");
+    assert_eq!(statistics.executed.rare(500), Vec::<&str>::new(), "every instruction runs: {report}");
     for code in TrapCode::ALL {
-        assert!(statistics.executed.trap_count(*code) >= 20, "every trap happens: {report}");
+        assert!(statistics.executed.trap_count(*code) >= 500, "every trap happens: {report}");
+    }
+    let passes: Vec<&str> = statistics.passes.keys().copied().collect();
+    let mut known = Passes::NAMES.to_vec();
+    known.sort_unstable();
+    assert_eq!(passes, known);
+    for (pass, count) in &statistics.passes {
+        assert!(*count >= PROGRAMS / 100, "pass {pass} changes something: {report}");
     }
     for (feature, count) in &statistics.features {
         assert!(*count >= PROGRAMS / 50, "programs with {feature} are common: {report}");
@@ -44,8 +55,8 @@ fn native_code_is_the_same_without_passes_and_with_each_alone() {
     let none = common::native_with(Passes::NONE);
     let alone: Vec<_> =
         (Passes::NAMES.iter()).map(|name| (*name, common::native_with(Passes::NONE.with(name).unwrap()))).collect();
-    let mut makers = vec![Maker { name: "jit without passes", make: &none }];
-    makers.extend(alone.iter().map(|(name, make)| Maker { name, make }));
+    let mut makers = vec![Maker::new("jit without passes", &none)];
+    makers.extend(alone.iter().map(|(name, make)| Maker::new(name, make)));
     for seed in 20_000..20_040 {
         let verified = Arc::new(generate(seed));
         let plan = Plan { seed, ..Plan::default() };

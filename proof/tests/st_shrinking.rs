@@ -38,11 +38,7 @@ fn confuse(
 
 /// Engines of which the last is wrong.
 fn makers<'m>(wrong: &'m khz_proof::oracle::MakeEngine<'m>) -> [Maker<'m>; 3] {
-    [
-        Maker { name: "interp", make: &common::interpreter },
-        Maker { name: "jit", make: &common::native },
-        Maker { name: "wrong", make: wrong },
-    ]
+    [Maker::new("interp", &common::interpreter), Maker::new("jit", &common::native), Maker::new("wrong", wrong)]
 }
 
 /// The first program of some seeds that differs in a wanted way, made small, and what it was before.

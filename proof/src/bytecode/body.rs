@@ -104,7 +104,7 @@ impl<'w> Body<'w> {
                 LocalType::Ref(ty) => references.push((SlotIndex(index as u16), *ty)),
             }
         }
-        let left = world.profile.size;
+        let left = world.profile.instructions;
         Body {
             world,
             id,

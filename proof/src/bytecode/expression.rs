@@ -175,10 +175,7 @@ impl Body<'_> {
     fn doubled(&mut self, ty: ValueType, depth: usize) {
         self.expression(ty, depth - 1);
         self.put(Instruction::Dup {});
-        let fits = |op: &NumericOp| op.result() == ty && op.operands() == [ty, ty] && op.trap().is_none();
-        let rows: Vec<NumericOp> = NumericOp::ALL.iter().copied().filter(fits).collect();
-        let op = rows[self.world.random.below(rows.len())];
-        self.put(Instruction::Numeric(op));
+        self.binary(ty);
     }
 
     fn text_value(&mut self, ty: ValueType, depth: usize) {

@@ -9,6 +9,7 @@ mod body;
 mod call;
 pub(crate) mod code;
 mod expression;
+mod idiom;
 mod reference;
 mod statement;
 mod world;
@@ -18,13 +19,60 @@ use khz_bytecode::ids::FunctionId;
 use khz_bytecode::limits::{MAX_CALL_DEPTH, MAX_STACK_DEPTH};
 use khz_bytecode::verify::{Verified, verify};
 
-/// A container of a seed, verified. The same on every machine.
+use crate::random::Random;
+
+/// How large a container is: what it costs to compile it grows with that, what it may show does so only slowly.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Size {
+    /// Functions of a few statements, few methods.
+    Small,
+    /// Functions of some ten instructions.
+    Medium,
+    /// Loops in loops, long expressions.
+    Large,
+    /// Functions of hundreds of instructions.
+    Huge,
+}
+
+impl Size {
+    /// Every size, the smallest first.
+    pub const ALL: [Size; 4] = [Size::Small, Size::Medium, Size::Large, Size::Huge];
+
+    /// A size as often as [`generate`] makes it.
+    fn drawn(random: &mut Random) -> Size {
+        Size::ALL[random.weighted(&[70, 22, 7, 1])]
+    }
+
+    /// How many instructions each function may have, about.
+    fn instructions(self, random: &mut Random) -> usize {
+        match self {
+            Size::Small => random.one_of([4, 8, 12]),
+            Size::Medium => random.one_of([15, 25, 40]),
+            Size::Large => random.one_of([60, 80, 150]),
+            Size::Huge => random.one_of([200, 400]),
+        }
+    }
+}
+
+/// A container of a seed, verified. The same on every machine. Most are small, few huge.
 ///
 /// # Panics
 /// When the container does not verify: the generator or the verifier is wrong.
 #[must_use]
 pub fn generate(seed: u64) -> Verified {
-    let mut world = world::World::new(seed);
+    write(seed, world::World::new(seed, None))
+}
+
+/// A container of a seed in one size, verified.
+///
+/// # Panics
+/// When the container does not verify: the generator or the verifier is wrong.
+#[must_use]
+pub fn generate_sized(seed: u64, size: Size) -> Verified {
+    write(seed, world::World::new(seed, Some(size)))
+}
+
+fn write(seed: u64, mut world: world::World) -> Verified {
     for id in 0..world.container.functions.len() {
         body::Body::new(&mut world, FunctionId(id as u16)).write();
     }

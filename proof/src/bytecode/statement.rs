@@ -31,6 +31,7 @@ impl Body<'_> {
             4,
             2,
             1,
+            8,
         ]) {
             0 => self.assignment(depth),
             1 => self.store_through(depth),
@@ -49,7 +50,8 @@ impl Body<'_> {
                 self.expression(ty, depth.min(2));
                 self.put(Instruction::Drop {});
             }
-            _ => self.put(Instruction::Nop {}),
+            13 => self.put(Instruction::Nop {}),
+            _ => self.idiom(),
         }
     }
 

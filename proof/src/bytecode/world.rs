@@ -8,6 +8,8 @@ use khz_bytecode::ids::{ArrayId, FunctionId, InstanceId, MethodId, ProgramId, Ta
 use khz_bytecode::value::{LocalType, RefType, Storage, ValueType};
 use khz_bytecode::verify::{Extent, block_rows};
 
+use super::Size;
+use super::idiom::swept;
 use crate::random::Random;
 
 /// What the program at hand shall have.
@@ -19,8 +21,10 @@ pub(crate) struct Profile {
     pub virtual_calls: bool,
     /// A union.
     pub unions: bool,
+    /// How large it is.
+    pub size: Size,
     /// How many instructions a function may have, about.
-    pub size: usize,
+    pub instructions: usize,
     /// How often, in percent, care is taken that an index, divisor or address is right.
     pub care: usize,
 }
@@ -56,13 +60,17 @@ pub(crate) struct World {
 
 impl World {
     /// Everything but the code of the functions.
-    pub fn new(seed: u64) -> World {
+    pub fn new(seed: u64, size: Option<Size>) -> World {
         let mut random = Random::new(seed);
+        let drawn = Size::drawn(&mut random);
+        let size = size.unwrap_or(drawn);
+        let instructions = size.instructions(&mut random);
         let profile = Profile {
             raw: random.chance(35),
             virtual_calls: random.chance(50),
             unions: random.chance(15),
-            size: random.one_of([15, 40, 40, 80, 150]),
+            size,
+            instructions,
             care: random.one_of([70, 92, 92, 99]),
         };
         let container = Container::default();
@@ -192,6 +200,11 @@ impl World {
         if count * i64::from(stride) > i64::from(LARGEST_VARIABLE_BYTES) {
             dimensions = vec![(0, 1)];
         }
+        self.add_descriptor(element, dimensions);
+    }
+
+    fn add_descriptor(&mut self, element: TypeId, dimensions: Vec<(i32, i32)>) {
+        let stride = self.extents[element.index()].size;
         self.container.types.arrays.push(ArrayDescriptor { element, stride, dimensions });
         let id = ArrayId(self.container.types.arrays.len() as u16 - 1);
         self.add(Type::Array(id));
@@ -225,6 +238,10 @@ impl World {
             self.add(Type::String { capacity });
         }
         self.add(Type::WideString { capacity: 5 });
+        for _ in 0..self.random.between(1, 2) {
+            let (element, bounds) = swept(&mut self.random);
+            self.add_descriptor(element, vec![bounds]);
+        }
         for _ in 0..self.random.between(1, 3) {
             let element = self.any_type(false);
             self.add_array(element);
@@ -383,13 +400,14 @@ impl World {
         if !matches!(self.container.types.types[ty.index()], Type::Block { .. }) {
             return;
         }
-        if self.random.chance(60) {
+        let often = if self.profile.size == Size::Small { 30 } else { 60 };
+        if self.random.chance(often) {
             let (parameters, results) = (self.parameters(2), self.results());
             self.head(Owner::Block(ty), parameters, results);
         }
         let mut own = Vec::new();
         for method in 0..self.container.types.methods.len() {
-            if self.random.chance(60) {
+            if self.random.chance(often) {
                 let signature = self.container.types.methods[method].clone();
                 let function = self.head(Owner::Block(ty), signature.parameters, signature.results);
                 own.push((MethodId(method as u16), function));

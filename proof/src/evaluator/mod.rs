@@ -29,6 +29,8 @@ pub struct Evaluator {
     verified: Arc<Verified>,
     layout: ImageLayout,
     charges_fuel: bool,
+    /// For each function and instruction, the fuel of the loop whose header begins there.
+    headers: Vec<Vec<Option<u32>>>,
     executed: Executed,
     watches: Vec<Watch>,
 }
@@ -45,7 +47,16 @@ impl Evaluator {
     /// For a resource; `layout` must be that of the images it will run on. With `charges_fuel`, [`Limits::fuel`] is looked at.
     #[must_use]
     pub fn new(verified: Arc<Verified>, layout: &ImageLayout, charges_fuel: bool) -> Self {
-        Evaluator { verified, layout: layout.clone(), charges_fuel, executed: Executed::default(), watches: Vec::new() }
+        let headers = (verified.facts().functions.iter()).map(|facts| {
+            let mut headers = vec![None; facts.instructions.len()];
+            for found in &facts.loops {
+                headers[facts.blocks[found.header.index()].start] = Some(found.fuel);
+            }
+            headers
+        });
+        let headers = headers.collect();
+        let (executed, watches) = (Executed::default(), Vec::new());
+        Evaluator { verified, layout: layout.clone(), charges_fuel, headers, executed, watches }
     }
 
     /// What it ran so far.
@@ -103,6 +114,7 @@ impl Engine for Evaluator {
             frames: frames.clone(),
             stack: Vec::new(),
             calls: Vec::new(),
+            headers: &self.headers,
             executed: &mut self.executed,
             watches: &mut self.watches,
         };
@@ -186,6 +198,7 @@ struct Run<'a> {
     frames: Range<u32>,
     stack: Vec<Item>,
     calls: Vec<Activation>,
+    headers: &'a [Vec<Option<u32>>],
     executed: &'a mut Executed,
     watches: &'a mut [Watch],
 }
@@ -263,12 +276,10 @@ impl Run<'_> {
         let verified = self.verified;
         while !self.calls.is_empty() {
             let (function, at) = (self.top().function, self.top().at);
-            let facts = verified.function(function);
-            let header = facts.loops.iter().find(|found| facts.blocks[found.header.index()].start == at);
-            if let Some(found) = header {
-                self.charge(found.fuel)?;
+            if let Some(fuel) = self.headers[function.index()][at] {
+                self.charge(fuel)?;
             }
-            let placed = &facts.instructions[at];
+            let placed = &verified.function(function).instructions[at];
             self.executed.ran(&placed.instruction);
             self.step(&placed.instruction)?;
         }

@@ -1,6 +1,8 @@
 //! The engines that the tests compare.
 #![allow(dead_code, reason = "each test file uses its part")]
 
+use std::cell::Cell;
+use std::rc::Rc;
 use std::sync::Arc;
 
 use khz_bytecode::container::Container;
@@ -12,8 +14,9 @@ use khz_interp::{Interpreter, InterpreterOptions};
 use khz_jit::{Jit, JitOptions, Passes};
 use khz_machine::engine::Engine;
 use khz_machine::image::ImageLayout;
-use khz_proof::oracle::Maker;
+use khz_proof::oracle::{Forms, MakeEngine, Maker};
 use khz_proof::st::compare::{FILE, Refusal};
+use khz_proof::statistics::Statistics;
 
 /// Makes an interpreter.
 pub fn interpreter(verified: Arc<Verified>, layout: &ImageLayout, fuel: bool) -> Result<Box<dyn Engine>, String> {
@@ -38,7 +41,58 @@ pub fn native_with(passes: Passes) -> impl Fn(Arc<Verified>, &ImageLayout, bool)
 
 /// Every engine.
 pub fn makers() -> Vec<Maker<'static>> {
-    vec![Maker { name: "interp", make: &interpreter }, Maker { name: "jit", make: &native }]
+    vec![Maker::new("interp", &interpreter), Maker::new("jit", &native)]
+}
+
+/// One seed in this many also runs in native code without one of the passes.
+const VARIANT_EVERY: u64 = 8;
+
+/// The engines for one seed of a search: all of them, native code that notes which passes changed something, and now and then native
+/// code without one pass, which one by the seed.
+pub struct Engines {
+    fired: Rc<Cell<Passes>>,
+    native: Box<MakeEngine<'static>>,
+    variant: Option<(String, Box<MakeEngine<'static>>)>,
+}
+
+impl Engines {
+    pub fn of_seed(seed: u64) -> Engines {
+        let fired = Rc::new(Cell::new(Passes::NONE));
+        let noted = Rc::clone(&fired);
+        let native = move |verified: Arc<Verified>, layout: &ImageLayout, fuel| {
+            let options = JitOptions { fuel, note_passes: true, ..JitOptions::default() };
+            let jit = Jit::new(verified, layout, options).map_err(|error| error.to_string())?;
+            let fired = jit.passes_fired().unwrap_or(Passes::NONE);
+            let both = fired.rows().filter(|(_, fired)| *fired).try_fold(noted.get(), |all, (name, _)| all.with(name));
+            noted.set(both.expect("passes have known names"));
+            let made: Box<dyn Engine> = Box::new(jit);
+            Ok(made)
+        };
+        let variant = seed.is_multiple_of(VARIANT_EVERY).then(|| {
+            let off = Passes::NAMES[(seed / VARIANT_EVERY) as usize % Passes::NAMES.len()];
+            let make: Box<MakeEngine<'static>> = Box::new(native_with(without(off)));
+            (format!("jit without {off}"), make)
+        });
+        Engines { fired, native: Box::new(native), variant }
+    }
+
+    pub fn makers(&self) -> Vec<Maker<'_>> {
+        let mut makers = vec![Maker::new("interp", &interpreter), Maker::new("jit", &*self.native)];
+        let variant = self.variant.as_ref();
+        makers.extend(variant.map(|(name, make)| Maker { name, make: &**make, forms: Forms::One }));
+        makers
+    }
+
+    /// Counts the passes that changed something in the program that was compared.
+    pub fn note(&self, statistics: &mut Statistics) {
+        self.fired.get().rows().for_each(|(name, fired)| statistics.pass(name, fired));
+    }
+}
+
+/// Every pass but one.
+pub fn without(off: &str) -> Passes {
+    let others = Passes::NAMES.iter().filter(|name| **name != off);
+    others.fold(Passes::NONE, |passes, name| passes.with(name).expect("passes have known names"))
 }
 
 /// Compiles a text to its first container; the code and the words of its first error.
