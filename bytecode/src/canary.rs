@@ -42,6 +42,13 @@ pub const fn planted(_fault: Fault) -> bool {
     false
 }
 
+/// Work for another thread, in which what the calling thread has planted now is planted too.
+#[cfg(not(feature = "canary"))]
+#[inline]
+pub fn carried<T, W: FnOnce() -> T>(work: W) -> W {
+    work
+}
+
 #[cfg(feature = "canary")]
 mod switch {
     use std::cell::Cell;
@@ -69,6 +76,15 @@ mod switch {
         Planted(())
     }
 
+    /// Work for another thread, in which what the calling thread has planted now is planted too.
+    pub fn carried<T>(work: impl FnOnce() -> T) -> impl FnOnce() -> T {
+        let fault = PLANTED.get();
+        move || {
+            let _planted = fault.map(plant);
+            work()
+        }
+    }
+
     impl Drop for Planted {
         fn drop(&mut self) {
             PLANTED.set(None);
@@ -77,4 +93,4 @@ mod switch {
 }
 
 #[cfg(feature = "canary")]
-pub use switch::{Planted, plant, planted};
+pub use switch::{Planted, carried, plant, planted};

@@ -1,5 +1,6 @@
 //! The whole way: bytes of source files to containers.
 
+use khz_bytecode::canary::carried;
 use khz_bytecode::container::Container;
 use khz_machine::library::blocks;
 use std::cell::Cell;
@@ -121,7 +122,7 @@ pub fn on_large_stack<T: Send>(work: impl Fn() -> T + Sync) -> T {
     };
     std::thread::scope(|scope| {
         let builder = std::thread::Builder::new().name("khz-frontend".to_owned()).stack_size(STACK_BYTES);
-        match builder.spawn_scoped(scope, with_room) {
+        match builder.spawn_scoped(scope, carried(with_room)) {
             Ok(thread) => thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)),
             // No thread to be had: the caller's own stack does for programs of ordinary depth.
             Err(_) => work(),

@@ -1,5 +1,6 @@
 //! Expressions to instructions.
 
+use khz_bytecode::canary::{Fault, planted};
 use khz_bytecode::container::{Constant, ElementaryType as E};
 use khz_bytecode::instruction::{Instruction as I, NumericOp as N};
 use khz_bytecode::value::{IntegerType, SlotPlace, ValueType};
@@ -298,7 +299,11 @@ impl FunctionBuilder<'_, '_> {
         }
     }
 
-    fn convert_integer(&mut self, from: E, to: E) {
+    fn convert_integer(&mut self, mut from: E, to: E) {
+        if planted(Fault::Frontend) && from == E::Usint && to.storage().bytes() > 1 {
+            self.numeric(N::I32Extend8S);
+            from = E::Sint;
+        }
         let (a, b) = (from.storage().value_type(), to.storage().value_type());
         match (a, b) {
             (ValueType::I32, ValueType::I64) => {

@@ -279,7 +279,7 @@ impl Bench<'_> {
         let bytes = names.bytes_of(layout, &variable)?;
         let mut evaluator = Evaluator::new(verified.clone(), layout, true);
         // Offsets fit: an image is smaller than 2 GiB.
-        evaluator.watch([bytes.start as u32..bytes.end as u32]);
+        evaluator.watch(std::iter::once(bytes.start as u32..bytes.end as u32));
         let mut image = Image::new(layout.clone(), verified.container());
         let mut now = 0_i64;
         for (number, round) in rounds.iter().enumerate().take(difference.round + 1) {
