@@ -17,5 +17,6 @@ pub mod lockstep;
 pub mod pipeline;
 pub mod project;
 pub mod testing;
+pub mod traces;
 
 pub use {khz_bytecode, khz_frontend, khz_interp, khz_jit, khz_machine, khz_proof, khz_scheduler};

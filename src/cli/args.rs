@@ -336,6 +336,30 @@ pub struct DiffArgs {
     /// Seed of the random inputs (default 0); it asks for them
     #[arg(long, value_name = "S", conflicts_with = "inputs")]
     pub seed: Option<u64>,
+    /// Compare with a trace that was recorded elsewhere: first column time_us, then a column for each variable
+    #[arg(long, value_name = "TRACE.csv", conflicts_with_all = ["inputs", "random_inputs", "seed"])]
+    pub against: Option<PathBuf>,
+    /// Lines COLUMN,VARIABLE[,FACTOR[,OFFSET]]: what the columns of the trace are
+    #[arg(long, value_name = "NAMES.csv", requires = "against")]
+    pub map: Option<PathBuf>,
+    /// How far a variable may lie from the trace: ABS + REL × |value|; without a name: every other REAL and LREAL
+    #[arg(long, value_name = "[NAME=]ABS[,REL]", requires = "against")]
+    pub tolerance: Vec<String>,
+    /// Microseconds to add to the trace's times, or `auto`: look for them
+    #[arg(long, value_name = "US|auto", requires = "against", allow_hyphen_values = true)]
+    pub align: Option<String>,
+    /// Columns that drive the program and are not compared (default: those located at %I); `none`
+    #[arg(long, value_name = "NAME,...", requires = "against")]
+    pub drive: Option<String>,
+    /// Rows of the trace are changes, not samples: between them its values hold, and each round is compared
+    #[arg(long, requires = "against")]
+    pub on_change: bool,
+    /// Both curves of every variable as one self-contained HTML page
+    #[arg(long, value_name = "OUT.html", requires = "against")]
+    pub report: Option<PathBuf>,
+    /// Which engines run along the trace
+    #[arg(long, value_enum, default_value = "both", requires = "against")]
+    pub engine: EnginesArg,
     #[command(flatten)]
     #[allow(missing_docs, reason = "clap would show it as help of the group")]
     pub resource: ResourceArgs,

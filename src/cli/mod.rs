@@ -10,6 +10,7 @@ mod explain;
 mod fmt;
 mod inputs;
 mod output;
+mod page;
 mod report;
 mod run;
 mod session;

@@ -180,6 +180,12 @@ impl<'p> Lockstep<'p> {
         &self.names
     }
 
+    /// How many engines.
+    #[must_use]
+    pub fn sides(&self) -> usize {
+        self.sides.len()
+    }
+
     /// Rounds so far, those before a reset included.
     #[must_use]
     pub fn rounds(&self) -> u64 {

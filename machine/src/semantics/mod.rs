@@ -22,6 +22,7 @@ pub use convert::*;
 pub use float::*;
 pub use integer::*;
 pub use memory::*;
+pub use parse::parse_time;
 pub use strings::StringPlace;
 pub use text::{TextBuffer, write_f32, write_f64, write_time};
 pub use value::{Operand, Value};

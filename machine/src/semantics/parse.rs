@@ -218,7 +218,8 @@ const DURATION_FRACTION_DIGITS: u32 = 18;
 
 /// A duration in nanoseconds and the bytes it takes: the longest prefix that is a literal of table 8, with or without `T#`, `TIME#`,
 /// `LT#`, `LTIME#`. Units fall; only the last may have a fraction, which is cut to whole nanoseconds.
-pub(crate) fn parse_time(bytes: &[u8]) -> Option<(i128, usize)> {
+#[must_use]
+pub fn parse_time(bytes: &[u8]) -> Option<(i128, usize)> {
     let mut cursor = Cursor { bytes, at: 0 };
     let _ = ["LTIME#", "TIME#", "LT#", "T#"].iter().any(|prefix| cursor.take_word(prefix));
     let negative = cursor.sign();

@@ -4,6 +4,7 @@ use std::fmt::Write;
 
 use khz_scheduler::StatisticsReport;
 
+use super::super::page::{END, escaped, head};
 use super::Figures;
 
 /// Bars of a histogram.
@@ -11,10 +12,6 @@ const BARS: usize = 60;
 /// Size of a histogram, in pixels.
 const WIDTH: usize = 720;
 const HEIGHT: usize = 160;
-
-const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;max-width:820px;margin:2em auto;padding:0 1em;color:#222}\
-table{border-collapse:collapse;margin:1em 0}td,th{padding:.3em .8em;text-align:right;border-bottom:1px solid #ddd}\
-td:first-child,th:first-child{text-align:left}svg{background:#fafafa;border:1px solid #ddd}rect{fill:#3b6ea5}text{font-size:11px;fill:#555}";
 
 /// The page of `khz bench --report`.
 pub fn page(file: &str, all: &[Figures]) -> String {
@@ -35,7 +32,8 @@ pub fn page(file: &str, all: &[Figures]) -> String {
         let _ = write!(out, "<h2>{}</h2>", figures.engine);
         histogram(&mut out, &figures.measured.batches);
     }
-    out + "<p>A scan is one cycle of each task, timed in batches of at least 100 µs. The slowest 1 % of the batches stand in the last bar.</p></body></html>"
+    out + "<p>A scan is one cycle of each task, timed in batches of at least 100 µs. The slowest 1 % of the batches stand in the last bar.</p>"
+        + END
 }
 
 /// The page of `khz bench --jitter --report`.
@@ -68,7 +66,7 @@ pub fn jitter_page(statistics: &StatisticsReport, names: &[String]) -> String {
             ],
         );
     }
-    out + "</body></html>"
+    out + END
 }
 
 /// One horizontal bar a figure, all to the scale of the largest.
@@ -85,16 +83,6 @@ fn bars(out: &mut String, figures: &[(&str, u64)]) {
         );
     }
     out.push_str("</svg>");
-}
-
-fn head(title: &str, heading: &str) -> String {
-    format!(
-        "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><title>{title}</title><style>{STYLE}</style></head><body><h1>{heading}</h1>"
-    )
-}
-
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
 /// How many batches took how long, from the fastest to the 99th percentile; the rest is in the last bar.

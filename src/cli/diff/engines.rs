@@ -49,8 +49,7 @@ pub fn run(args: &DiffArgs) -> Outcome {
         }
         Err(mut found) => {
             lockstep.follow(&mut found, inputs.as_mut(), FOLLOWED_ROUNDS);
-            report(args.common.format, &found, &sources);
-            Ok(Status::Differ)
+            Ok(report_difference(args.common.format, &found, &sources))
         }
     }
 }
@@ -103,16 +102,17 @@ fn random_inputs(args: &DiffArgs, session: &Session<'_>, image: &Image) -> Optio
     args.is_random().then(|| RandomInputs::new(&session.program, image.layout(), seed, &kept))
 }
 
-/// Tells a difference.
-fn report(format: Format, found: &Difference, sources: &SourceMap) {
+/// Tells a difference between engines.
+pub fn report_difference(format: Format, found: &Difference, sources: &SourceMap) -> Status {
     if format == Format::Json {
         result(&difference_json(found, sources).to_string());
     }
     people(&difference_text(found, sources));
+    Status::Differ
 }
 
 /// A difference for people.
-pub fn difference_text(found: &Difference, sources: &SourceMap) -> String {
+fn difference_text(found: &Difference, sources: &SourceMap) -> String {
     let place = match found.round {
         0 => "before the first round".to_string(),
         round => format!("in round {round}, at {:.6} s", found.time.0 as f64 / 1e9),
@@ -175,7 +175,7 @@ fn source_line<'s>(place: &DescribedPlace, sources: &'s SourceMap) -> Option<&'s
 }
 
 /// A difference for programs.
-pub fn difference_json(found: &Difference, sources: &SourceMap) -> Value {
+fn difference_json(found: &Difference, sources: &SourceMap) -> Value {
     let [first, second] = &found.sides;
     let pair = |values: &[String; 2]| json!({ first.as_str(): values[0], second.as_str(): values[1] });
     let place = |place: &DescribedPlace| {

@@ -1,5 +1,7 @@
-//! `khz diff`: engines in lock-step on a user's program ([`engines`]) or on generated ones, or a program against a recorded trace.
+//! `khz diff`: engines in lock-step on a user's program ([`engines`]), or the program against a recorded trace ([`against`]).
 
+mod against;
+mod curves;
 mod engines;
 
 use super::Outcome;
@@ -7,5 +9,8 @@ use super::args::DiffArgs;
 
 /// Runs it.
 pub fn run(args: &DiffArgs) -> Outcome {
-    engines::run(args)
+    match &args.against {
+        Some(path) => against::run(args, path),
+        None => engines::run(args),
+    }
 }
