@@ -154,6 +154,10 @@ fn line(out: &mut String, class: &str, curve: &Curve, scale: &Scale) {
     let _ = write!(out, "<polyline class=\"{class}\" points=\"");
     let mut last = None;
     for (x, stretch) in curve.stretches() {
+        let is_level = stretch.least == stretch.greatest && last == Some(scale.y(stretch.first));
+        if is_level {
+            continue;
+        }
         if let Some(level) = last {
             let _ = write!(out, "{x},{level:.1} ");
         }
