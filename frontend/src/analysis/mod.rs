@@ -34,7 +34,7 @@ use crate::compile::{CompileOptions, DefaultTask, Dialect};
 use crate::diagnostics::similar::nearest;
 use crate::diagnostics::{Diagnostic, Rule, Severity, semantic as rules};
 use crate::source::{FileId, Span};
-use crate::syntax::ast::{Ast, Ident, Pou, TypeDecl, VarDecl, VarSection};
+use crate::syntax::ast::{Ast, Declaration, Ident, Pou, TypeDecl, VarDecl, VarSection};
 use crate::syntax::symbol::Symbol;
 use crate::testing::{TestFindings, TestUnit};
 
@@ -146,6 +146,10 @@ struct Analyzer<'a> {
     lists: BTreeMap<Symbol, BTreeMap<Symbol, GlobalId>>,
     depth: u32,
     suggestions: u32,
+    /// Declarations outside of POUs may have been lost.
+    names_lost: bool,
+    /// POUs whose own declarations may have been lost.
+    lost_in: Vec<Span>,
     /// Present when tests are compiled.
     tests: Option<testing::Tests>,
 }
@@ -191,6 +195,8 @@ impl<'a> Analyzer<'a> {
             lists: BTreeMap::new(),
             depth: 0,
             suggestions: 0,
+            names_lost: ast.files.iter().any(|file| file.names_lost),
+            lost_in: ast.declarations().filter_map(lost_span).collect(),
             tests: None,
         }
     }
@@ -241,6 +247,12 @@ impl<'a> Analyzer<'a> {
         Some(result)
     }
 
+    /// Whether an unknown name may be one whose declaration was wrong, which has been reported there.
+    fn may_be_lost(&self, span: Span) -> bool {
+        let inside = |pou: &Span| pou.file == span.file && pou.start <= span.start && span.end <= pou.end;
+        self.names_lost || self.lost_in.iter().any(inside)
+    }
+
     /// Reports an unknown name with the nearest known one.
     fn report_unknown(
         &mut self,
@@ -249,7 +261,7 @@ impl<'a> Analyzer<'a> {
         message: String,
         known: impl Iterator<Item = Symbol>,
     ) {
-        if ident.is_missing() {
+        if ident.is_missing() || self.may_be_lost(ident.span) {
             return;
         }
         let wanted = self.text(ident.symbol);
@@ -264,6 +276,14 @@ impl<'a> Analyzer<'a> {
             found = found.help(format!("did you mean `{}`?", self.ast.names.text_as_written(symbol)));
         }
         self.push(found);
+    }
+}
+
+/// A POU whose declarations may have been lost.
+fn lost_span(declaration: &Declaration) -> Option<Span> {
+    match declaration {
+        Declaration::Pou(pou) if pou.names_lost => Some(pou.span),
+        _ => None,
     }
 }
 

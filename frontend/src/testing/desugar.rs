@@ -156,7 +156,19 @@ impl Maker {
             in_suite,
             has_teardown: teardown.is_some(),
         };
-        (unit, Pou { kind: PouKind::Program, name, result: None, sections, body, attributes: Vec::new(), span })
+        (
+            unit,
+            Pou {
+                kind: PouKind::Program,
+                name,
+                result: None,
+                sections,
+                body,
+                attributes: Vec::new(),
+                names_lost: false,
+                span,
+            },
+        )
     }
 
     /// Lets the instances of a function block be mocked: `IF mocked THEN calls := calls + 1; RETURN; END_IF` before its body.

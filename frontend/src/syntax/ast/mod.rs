@@ -58,6 +58,8 @@ pub struct SourceUnit {
     pub global_list: Option<Ident>,
     /// What it declares, in order.
     pub declarations: Vec<Declaration>,
+    /// Its declarations outside of POUs were wrong in a way that may have lost names.
+    pub names_lost: bool,
     /// Its unit tests.
     pub tests: TestSuite,
     /// Pragmas that are no attributes, or that stand where no declaration follows; they have no meaning of their own.

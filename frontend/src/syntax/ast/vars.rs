@@ -18,6 +18,8 @@ pub struct Pou {
     pub body: Block,
     /// Attribute pragmas before it.
     pub attributes: Vec<Attribute>,
+    /// Its declarations were wrong in a way that may have lost names: which ones are unknown can not be said.
+    pub names_lost: bool,
     /// From its first keyword to its END_….
     pub span: Span,
 }

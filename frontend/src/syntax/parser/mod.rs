@@ -96,6 +96,8 @@ struct Parser<'a> {
     bad_names: BTreeSet<Symbol>,
     nesting: u32,
     open: OpenBlocks,
+    /// Whether declarations were skipped, so that names may be unknown that the text does declare.
+    names_lost: bool,
     /// Variable sections found among the statements of the current POU.
     late_sections: Vec<VarSection>,
     /// Whether the current statements are a test's.
@@ -129,6 +131,7 @@ impl<'a> Parser<'a> {
             bad_names: BTreeSet::new(),
             nesting: 0,
             open: OpenBlocks::default(),
+            names_lost: false,
             late_sections: Vec::new(),
             in_test: false,
             suite: TestSuite::default(),
@@ -369,6 +372,13 @@ impl<'a> Parser<'a> {
         Ident { symbol: Symbol::MISSING, spelling: Symbol::MISSING, span: self.span().before() }
     }
 
+    /// The name of something that is declared here.
+    fn declared_name(&mut self, what: &str) -> Ident {
+        let name = self.name(what);
+        self.names_lost |= name.is_missing();
+        name
+    }
+
     /// The current token as a name.
     fn take_name(&mut self) -> Ident {
         let span = self.bump();
@@ -441,6 +451,7 @@ impl<'a> Parser<'a> {
             file: self.file,
             global_list: None,
             declarations,
+            names_lost: self.names_lost,
             tests,
             pragmas: std::mem::take(&mut self.loose_pragmas),
         }

@@ -86,6 +86,7 @@ impl Parser<'_> {
         self.report_expected(
             "a declaration: `PROGRAM`, `FUNCTION`, `FUNCTION_BLOCK`, `TYPE`, `VAR_GLOBAL` or `CONFIGURATION`",
         );
+        self.names_lost = true;
         loop {
             self.bump();
             match self.kind() {
@@ -106,6 +107,7 @@ impl Parser<'_> {
     /// ```
     fn pou(&mut self, kind: PouKind, attributes: Vec<Attribute>) -> Pou {
         let open = self.bump();
+        let lost_outside = std::mem::take(&mut self.names_lost);
         let name = self.name(&format!("the name of the {}", kind.opener()));
         let result = self.result_type(kind);
         self.inheritance();
@@ -116,7 +118,8 @@ impl Parser<'_> {
         self.end_of_pou(kind, open);
         let span = self.span_from(open);
         self.eat(TokenKind::Semicolon);
-        Pou { kind, name, result, sections, body, attributes, span }
+        let names_lost = std::mem::replace(&mut self.names_lost, lost_outside || name.is_missing());
+        Pou { kind, name, result, sections, body, attributes, names_lost, span }
     }
 
     /// `[ ':' type ]`: of functions only.

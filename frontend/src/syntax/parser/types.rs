@@ -39,6 +39,7 @@ impl Parser<'_> {
                 }
                 _ => {
                     self.report_expected("the name of a type or `END_TYPE`");
+                    self.names_lost = true;
                     self.bump();
                     self.skip_declaration(Keyword::EndType);
                 }
@@ -49,7 +50,7 @@ impl Parser<'_> {
     /// `name ':' type [ ':=' initial-value ] ';'`.
     fn type_decl(&mut self, attributes: Vec<Attribute>) -> TypeDecl {
         let start = self.span();
-        let name = self.name("the name of a type");
+        let name = self.declared_name("the name of a type");
         if self.at_word("EXTENDS") {
             self.report_unsupported("a structure that EXTENDS another");
             self.bump();
@@ -172,16 +173,26 @@ impl Parser<'_> {
         let mut values = Vec::new();
         while !self.at(TokenKind::RightParen) {
             let attributes = self.attributes();
-            let name = self.name("the name of a value");
+            let name = self.declared_name("the name of a value");
             if name.is_missing() {
+                if self.at(TokenKind::Comma) {
+                    self.bump();
+                    continue;
+                }
                 break;
             }
             let value = self.eat(TokenKind::Assign).map(|_| self.expression());
             values.push(EnumValue { name, value, attributes });
             if self.eat(TokenKind::Comma).is_none() {
-                break;
+                let another = self.at(TokenKind::Ident)
+                    && matches!(self.kind_at(1), TokenKind::Comma | TokenKind::RightParen | TokenKind::Assign);
+                if !another {
+                    break;
+                }
+                self.report_missing("`,`", "this value");
             }
         }
+        self.names_lost |= !self.at(TokenKind::RightParen);
         self.close(TokenKind::RightParen, "the values");
         values
     }
@@ -190,7 +201,11 @@ impl Parser<'_> {
     fn array_type(&mut self) -> TypeSpecKind {
         self.bump();
         let mut dims = Vec::new();
-        if self.expect(TokenKind::LeftBracket, "`ARRAY`") {
+        let has_bounds = self.expect(TokenKind::LeftBracket, "`ARRAY`");
+        if !has_bounds && self.at_keyword(Keyword::Array) {
+            return self.nested(Self::array_type, |_| TypeSpecKind::Error);
+        }
+        if has_bounds {
             loop {
                 dims.push(match self.eat(TokenKind::Star) {
                     Some(span) => ArrayDim::Open(span),
@@ -203,7 +218,8 @@ impl Parser<'_> {
             self.close(TokenKind::RightBracket, "the bounds");
         }
         self.expect_keyword(Keyword::Of, "the bounds of the array");
-        TypeSpecKind::Array { dims, element: Box::new(self.type_spec()) }
+        let element = Box::new(self.type_spec());
+        if has_bounds { TypeSpecKind::Array { dims, element } } else { TypeSpecKind::Error }
     }
 
     /// `structure = 'STRUCT' { declaration } 'END_STRUCT' | 'UNION' { declaration } 'END_UNION'`.

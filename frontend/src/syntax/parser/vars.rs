@@ -135,8 +135,13 @@ impl Parser<'_> {
                 _ => {
                     self.drop_attributes(attributes);
                     self.report_expected(&format!("a declaration or `{}`", list.end.text()));
+                    self.names_lost = true;
+                    // The first name of a list is missing.
+                    let goes_on = self.at(TokenKind::Comma) && self.kind_at(1) == TokenKind::Ident;
                     self.bump();
-                    self.skip_declaration(list.end);
+                    if !goes_on {
+                        self.skip_declaration(list.end);
+                    }
                 }
             }
         }
@@ -169,9 +174,19 @@ impl Parser<'_> {
     /// `declaration = name { ',' name } [ 'AT' direct-address ] ':' type [ edge ] [ ':=' initial-value ] ';'`.
     fn var_decl(&mut self, end: Keyword, attributes: Vec<Attribute>) -> VarDecl {
         let start = self.span();
-        let mut names = vec![self.name("the name of a variable")];
-        while self.eat(TokenKind::Comma).is_some() {
-            names.push(self.name("the name of a variable"));
+        let mut names = vec![self.declared_name("the name of a variable")];
+        loop {
+            if self.eat(TokenKind::Comma).is_none() {
+                // `a b, c : INT;`: what follows is a name too.
+                let another = self.at(TokenKind::Ident)
+                    && !self.on_new_line()
+                    && matches!(self.kind_at(1), TokenKind::Comma | TokenKind::Colon);
+                if !another {
+                    break;
+                }
+                self.report_missing("`,`", "this name");
+            }
+            names.push(self.declared_name("the name of a variable"));
         }
         let address = self.location();
         let ty = self.declared_type("the name of the variable");
@@ -238,6 +253,7 @@ impl Parser<'_> {
                 TokenKind::Keyword(word) if word == end || boundary(word) => return,
                 TokenKind::Ident if self.on_new_line() && self.kind_at(1) == TokenKind::Colon => return,
                 _ => {
+                    self.names_lost |= self.at(TokenKind::Ident);
                     self.bump();
                 }
             }
