@@ -336,6 +336,9 @@ pub struct DiffArgs {
     /// Seed of the random inputs (default 0); it asks for them
     #[arg(long, value_name = "S", conflicts_with = "inputs")]
     pub seed: Option<u64>,
+    /// With random inputs: give other variables new values now and then, too, for states that the program hardly comes to
+    #[arg(long, conflicts_with_all = ["inputs", "against"])]
+    pub random_variables: bool,
     /// Compare with a trace that was recorded elsewhere: first column time_us, then a column for each variable
     #[arg(long, value_name = "TRACE.csv", conflicts_with_all = ["inputs", "random_inputs", "seed"])]
     pub against: Option<PathBuf>,
@@ -371,7 +374,7 @@ pub struct DiffArgs {
 impl DiffArgs {
     /// Whether the inputs are random.
     pub fn is_random(&self) -> bool {
-        self.random_inputs || self.seed.is_some()
+        self.random_inputs || self.random_variables || self.seed.is_some()
     }
 }
 

@@ -14,8 +14,12 @@ use crate::pipeline::Program;
 const MAX_LEAVES: usize = 1000;
 /// Parts that get values in all.
 const MAX_INPUTS: usize = 10_000;
+/// Percent of the other variables that change in a round, where they are meant too.
+const STIR_PERCENT: usize = 4;
 /// Percent of the inputs that change in a round. The others keep their value, so that timers run out and edges fall.
 const CHANGE_PERCENT: usize = 40;
+/// How the names begin that the scheduler writes the time to.
+const SYSTEM_VARIABLES: &str = "__SYSTEM_";
 /// Longest text that is given to a STRING.
 const MAX_TEXT: usize = 40;
 
@@ -24,11 +28,12 @@ const MAX_TEXT: usize = 40;
 pub struct RandomInputs {
     random: Random,
     names: VariableTable,
-    variables: Vec<(Variable, Domain)>,
+    /// What changes, and how often: percent of the rounds.
+    variables: Vec<(Variable, Domain, usize)>,
     /// %I.
     region: Range<usize>,
-    /// Bytes of the variables.
-    bytes: Vec<Range<usize>>,
+    /// Bytes that were written last.
+    written: Vec<Range<usize>>,
 }
 
 impl RandomInputs {
@@ -47,11 +52,26 @@ impl RandomInputs {
         let is_kept = |variable: &Variable| kept.iter().any(|name| name.eq_ignore_ascii_case(&variable.name));
         let leaves = roots.iter().flat_map(|root| names.leaves(root, MAX_LEAVES));
         let leaves = leaves.filter(|leaf| !leaf.constant && !is_kept(leaf)).take(MAX_INPUTS);
-        let variables: Vec<(Variable, Domain)> =
-            leaves.filter_map(|leaf| names.domain(&leaf).map(|domain| (leaf, domain))).collect();
-        let bytes = variables.iter().filter_map(|(variable, _)| names.bytes_of(layout, variable)).collect();
+        let variables = leaves.filter_map(|leaf| names.domain(&leaf).map(|domain| (leaf, domain, CHANGE_PERCENT)));
+        let variables = variables.collect();
         let region = layout.input.start as usize..layout.input.end as usize;
-        RandomInputs { random: Random::new(seed), names, variables, region, bytes }
+        RandomInputs { random: Random::new(seed), names, variables, region, written: Vec::new() }
+    }
+
+    /// Gives values to all other variables too, less often: states that a program would hardly come to. Those in `kept` are left alone.
+    #[must_use]
+    pub fn and_variables(mut self, kept: &[String]) -> RandomInputs {
+        let is_kept = |variable: &Variable| {
+            let is_input = self.variables.iter().any(|(input, ..)| input.name == variable.name);
+            let is_clock = variable.name.starts_with(SYSTEM_VARIABLES);
+            is_input || is_clock || kept.iter().any(|name| name.eq_ignore_ascii_case(&variable.name))
+        };
+        let leaves = self.names.variables().flat_map(|root| self.names.leaves(&root, MAX_LEAVES));
+        let leaves = leaves.filter(|leaf| !leaf.constant && !is_kept(leaf)).take(MAX_INPUTS);
+        let others: Vec<_> =
+            leaves.filter_map(|leaf| self.names.domain(&leaf).map(|domain| (leaf, domain, STIR_PERCENT))).collect();
+        self.variables.extend(others);
+        self
     }
 
     /// Whether there is nothing to give values to.
@@ -62,21 +82,23 @@ impl RandomInputs {
 
     /// The variables that get values, by name.
     pub fn names(&self) -> impl Iterator<Item = &str> {
-        self.variables.iter().map(|(variable, _)| variable.name.as_str())
+        self.variables.iter().map(|(variable, ..)| variable.name.as_str())
     }
 
     /// Changes some inputs in the image.
     pub fn apply(&mut self, image: &mut Image) {
-        if self.variables.is_empty() {
+        self.written.clear();
+        if self.variables.iter().all(|(.., percent)| *percent != CHANGE_PERCENT) {
             // A stripped container: %I by its bytes.
             for byte in &mut image.bytes_mut()[self.region.clone()] {
                 if self.random.chance(CHANGE_PERCENT) {
                     *byte = if self.random.chance(30) { 0xFF } else { self.random.bits() as u8 };
                 }
             }
+            self.written.push(self.region.clone());
         }
-        for (variable, domain) in &self.variables {
-            if !self.random.chance(CHANGE_PERCENT) {
+        for (variable, domain, percent) in &self.variables {
+            if !self.random.chance(*percent) {
                 continue;
             }
             if let Domain::Text { wide, capacity } = domain {
@@ -86,12 +108,13 @@ impl RandomInputs {
                 let bits = bits(&mut self.random, domain);
                 self.names.write_bits(image, variable, bits);
             }
+            self.written.extend(self.names.bytes_of(image.layout(), variable));
         }
     }
 
-    /// Makes the inputs of another image those of `from`.
+    /// Writes to another image what was written to `from` last.
     pub fn copy(&self, from: &Image, to: &mut Image) {
-        for range in self.bytes.iter().chain([&self.region]) {
+        for range in &self.written {
             to.bytes_mut()[range.clone()].copy_from_slice(&from.bytes()[range.clone()]);
         }
     }

@@ -98,8 +98,11 @@ fn random_inputs(args: &DiffArgs, session: &Session<'_>, image: &Image) -> Optio
         .filter_map(|set| set.split_once('='))
         .map(|(name, _)| name.trim().to_string())
         .collect();
-    let seed = args.seed.unwrap_or(0);
-    args.is_random().then(|| RandomInputs::new(&session.program, image.layout(), seed, &kept))
+    if !args.is_random() {
+        return None;
+    }
+    let inputs = RandomInputs::new(&session.program, image.layout(), args.seed.unwrap_or(0), &kept);
+    Some(if args.random_variables { inputs.and_variables(&kept) } else { inputs })
 }
 
 /// Tells a difference between engines.
