@@ -101,7 +101,7 @@ fn run_file(path: &Path, rounds: u64, seed: u64) -> Tally {
     let source = SourceInput { name: name.clone(), bytes };
     match pipeline::compile(&[source], &options) {
         Err(Refused::Diagnostics { .. }) if says("error:") || says("not yet") || !text.contains("PROGRAM") => {
-            tally.refused += 1
+            tally.refused += 1;
         }
         Err(error) => tally.wrong.push(format!("{name}: {error}")),
         Ok(loaded) if loaded.programs.is_empty() => tally.without_program += 1,
