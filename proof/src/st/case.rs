@@ -124,7 +124,8 @@ fn parts(source: &Source, path: &str, ty: Ty, at: Vec<usize>, found: &mut Vec<(S
     }
 }
 
-fn value(source: &Source, ty: Ty, random: &mut Random) -> Value {
+/// A value for a part of a variable.
+pub(crate) fn value(source: &Source, ty: Ty, random: &mut Random) -> Value {
     match ty {
         Ty::K(Kind::Real) => Value::Real(finite(random) as f32),
         Ty::K(Kind::Lreal) => Value::Lreal(finite(random)),

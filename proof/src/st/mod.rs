@@ -7,6 +7,7 @@
 //! [`case`] adds what comes from outside, [`compare`] runs text and rounds in the engines, and [`shrink`] takes both apart as long as a difference stays.
 
 pub mod blocks;
+pub mod c;
 pub mod case;
 pub mod compare;
 mod declare;
