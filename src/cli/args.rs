@@ -323,6 +323,7 @@ pub struct TestArgs {
 
 /// `khz diff`.
 #[derive(Debug, Args)]
+#[command(mut_arg("files", |files| files.required(false).required_unless_present("random")))]
 pub struct DiffArgs {
     #[command(flatten)]
     #[allow(missing_docs, reason = "clap would show it as help of the group")]
@@ -333,12 +334,22 @@ pub struct DiffArgs {
     /// Give the inputs new values each round: what is located at %I, or where nothing is, VAR_INPUT of the programs
     #[arg(long, conflicts_with = "inputs")]
     pub random_inputs: bool,
-    /// Seed of the random inputs (default 0); it asks for them
+    /// Seed of the random inputs, which it asks for, or of the first generated program (default 0)
     #[arg(long, value_name = "S", conflicts_with = "inputs")]
     pub seed: Option<u64>,
     /// With random inputs: give other variables new values now and then, too, for states that the program hardly comes to
     #[arg(long, conflicts_with_all = ["inputs", "against"])]
     pub random_variables: bool,
+    /// Compare N generated programs instead: from --seed on, 10 scans each
+    #[arg(long, value_name = "N", conflicts_with_all = ["files", "against", "inputs", "random_inputs", "random_variables"])]
+    pub random: Option<u64>,
+    /// Threads for --random; they do not change what is printed (default: one for each processor)
+    #[arg(long, value_name = "N", requires = "random")]
+    pub threads: Option<usize>,
+    /// A fault of `khz_bytecode::canary` to plant, for tests
+    #[cfg(feature = "canary")]
+    #[arg(long, hide = true)]
+    pub plant: Option<String>,
     /// Compare with a trace that was recorded elsewhere: first column time_us, then a column for each variable
     #[arg(long, value_name = "TRACE.csv", conflicts_with_all = ["inputs", "random_inputs", "seed"])]
     pub against: Option<PathBuf>,

@@ -12,6 +12,7 @@ use khz_machine::engine::{DeadlineCell, Engine, Entry, Limits};
 use khz_machine::image::{Image, ImageLayout};
 use khz_machine::trap::Trap;
 use khz_machine::variables::{Variable, VariableTable, VariableValue};
+use khz_proof::campaign::Figures;
 use khz_proof::random::Random;
 use khz_proof::st::evaluate::{Evaluator, Stop};
 use khz_proof::st::generate;
@@ -39,6 +40,19 @@ pub struct Tally {
     pub traps: BTreeMap<String, u64>,
     /// Programs with a word of the language in their text.
     pub words: BTreeMap<String, u64>,
+}
+
+impl Figures for Tally {
+    fn merge(&mut self, later: Self) {
+        self.programs += later.programs;
+        self.scans += later.scans;
+        self.values += later.values;
+        self.too_long += later.too_long;
+        self.unused += later.unused;
+        self.refused += later.refused;
+        later.traps.into_iter().for_each(|(name, count)| *self.traps.entry(name).or_default() += count);
+        later.words.into_iter().for_each(|(name, count)| *self.words.entry(name).or_default() += count);
+    }
 }
 
 impl Tally {
