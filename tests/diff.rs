@@ -268,3 +268,21 @@ fn random_inputs_start_event_tasks() {
     assert_eq!(summary.rounds, 200);
     assert!((10..60).contains(&summary.cycles), "{summary:?}");
 }
+
+#[test]
+fn generated_programs_are_the_same_whatever_the_threads() {
+    let run = |words: &[&str]| {
+        let output = khz().args(["diff", "--random", "41", "--seed", "12"]).args(words).output().unwrap();
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+        (stdout(&output), stderr(&output))
+    };
+    let one = run(&["--threads", "1"]);
+    assert_eq!(one, run(&["--threads", "3"]));
+    assert!(one.1.contains("equal: 41 programs, 10 scans each, from seed 12 on"), "{}", one.1);
+    assert!(one.1.contains("containers: programs 20 "), "one of the pair is left out: {}", one.1);
+    let told: serde_json::Value = serde_json::from_str(&run(&["--format", "json"]).0).unwrap();
+    assert_eq!((&told["equal"], &told["programs"], &told["seed"]), (&true.into(), &41.into(), &12.into()));
+    assert!(told["reached"].as_str().is_some_and(|text| text.contains("Structured Text: ")), "{told}");
+    let output = khz().args(["diff", "--random", "3", "examples/bottling.st"]).output().unwrap();
+    assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
+}

@@ -5,13 +5,15 @@ mod common;
 use common::{Scratch, khz, stderr, stdout};
 use serde_json::Value;
 
-/// The planted interpreter rotates by one too many from 16 bits on: from the fifth scan on.
+/// The planted interpreter rotates 16 bits by one too many from a constant count of 16 on: here from the fifth scan on.
 const ROTATES: &str = "\
 PROGRAM main
 VAR scan : INT; word : WORD := 16#8001; turned : WORD; copy : WORD; END_VAR
   scan := scan + 1;
   turned := 0;
-  turned := ROL(word, 11 + scan);
+  IF scan >= 5 THEN
+    turned := ROL(word, 19);
+  END_IF;
   IF scan > 6 THEN
     copy := turned;
   END_IF;
@@ -32,15 +34,15 @@ fn a_planted_fault_is_told_with_variable_round_and_statement() {
     assert_eq!(first["name"], "main.turned");
     assert_eq!(
         (&first["statement"]["line"], &first["statement"]["text"]),
-        (&5.into(), &"turned := ROL(word, 11 + scan);".into())
+        (&6.into(), &"turned := ROL(word, 19);".into())
     );
     assert_eq!(first["evaluator"], first["values"]["jit with fuel"], "{told}");
     assert_eq!(told["evaluator"]["agrees_with"], serde_json::json!(["jit with fuel"]));
     let later = told["variables"].as_array().unwrap().iter().find(|found| found["name"] == "main.copy").unwrap();
     assert_eq!(later["round"], 7);
     let people = stderr(&output);
-    assert!(people.contains("turn.st:5:3 in main"), "{people}");
-    assert!(people.contains("      turned := ROL(word, 11 + scan);"), "{people}");
+    assert!(people.contains("turn.st:6:5 in main"), "{people}");
+    assert!(people.contains("      turned := ROL(word, 19);"), "{people}");
 }
 
 #[test]
