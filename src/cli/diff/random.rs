@@ -96,7 +96,7 @@ pub fn run(args: &DiffArgs, count: u64) -> Outcome {
         people(&statistics);
         match (found, &small) {
             (Some(found), Some(small)) => {
-                people(&format!("seed {} differs: {}\n{small}", found.seed, found.description))
+                people(&format!("seed {} differs: {}\n{small}", found.seed, found.description));
             }
             _ => people(&format!("equal: {count} programs, {SCANS} scans each, from seed {first} on")),
         }
