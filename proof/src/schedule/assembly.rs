@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use super::memory::{GLOBAL_NAMES, INIT_ORDER, INIT_STARTS, OWN_NAMES};
-use super::plan::{Action, Area, Bit, Condition, Counter, Deed, Place, Plan, Single, Task, Trigger, Value};
+use super::plan::{Action, Area, Bit, Condition, Counter, Deed, Home, Place, Plan, Single, Task, Trigger, Value};
 
 /// Slots of an instance: [`OWN_NAMES`] in their order, the last three of them BOOLs.
 const OWN_BOOLS: usize = 3;
@@ -44,7 +44,7 @@ impl Printer<'_> {
 
     /// Where the slots of an instance begin.
     fn first_slot(&self, instance: usize) -> usize {
-        let shared = GLOBAL_NAMES.len() + 2 + self.plan.globals.iter().filter(|in_data| !**in_data).count();
+        let shared = GLOBAL_NAMES.len() + 2 + self.plan.globals.iter().filter(|home| **home != Home::Data).count();
         shared + instance * OWN_NAMES.len()
     }
 
@@ -65,8 +65,8 @@ impl Printer<'_> {
             self.line(&format!("global {name} i64"));
         }
         self.line("global ltime i64\nglobal time i64\nsystem up_time time\nsystem up_ltime ltime");
-        for (at, in_data) in self.plan.globals.iter().enumerate() {
-            let line = if *in_data { format!("data b{at} bool") } else { format!("global b{at} b1") };
+        for (at, home) in self.plan.globals.iter().enumerate() {
+            let line = if *home == Home::Data { format!("data b{at} bool") } else { format!("global b{at} b1") };
             self.line(&line);
         }
         let used = |program: &usize| self.plan.instances.iter().any(|instance| instance.program == *program);
@@ -98,7 +98,9 @@ impl Printer<'_> {
             write!(line, " priority {} watchdog {} sensitivity {}", task.priority, task.watchdog_us, task.sensitivity);
         if let Some(single) = task.single() {
             let _ = match single {
-                Single::Global(global) if self.plan.globals[global] => write!(line, " single data b{global}"),
+                Single::Global(global) if self.plan.globals[global] == Home::Data => {
+                    write!(line, " single data b{global}")
+                }
                 Single::Global(global) => write!(line, " single slot b{global}"),
                 Single::Instance(instance, place) => {
                     let slot = self.own_slot(instance, own_name(place));
@@ -248,7 +250,7 @@ impl Printer<'_> {
 
     fn access(&mut self, place: Place, verb: &str) {
         let line = match place {
-            Place::Global(global) if self.plan.globals[global] => format!("{verb} d b1 b{global}"),
+            Place::Global(global) if self.plan.globals[global] == Home::Data => format!("{verb} d b1 b{global}"),
             Place::Global(global) => format!("slot.{verb} g b{global}"),
             Place::Flag | Place::Source | Place::Sink => format!("slot.{verb} p {}", own_name(place)),
             Place::Bit(bit) => format!("{verb}.bit {} {} {}", letter(bit), bit.byte, bit.bit),
@@ -269,8 +271,8 @@ impl Printer<'_> {
             self.line(&format!("  variable \"{name}\" slot {slot} 0"));
         }
         let (mut slot, mut byte) = (GLOBAL_NAMES.len() + 2, 16);
-        for (at, in_data) in self.plan.globals.iter().enumerate() {
-            if *in_data {
+        for (at, home) in self.plan.globals.iter().enumerate() {
+            if *home == Home::Data {
                 self.line(&format!("  variable \"b{at}\" bytes d {byte} 1"));
                 byte += 1;
             } else {

@@ -2,8 +2,8 @@
 
 use super::memory::INIT_STARTS;
 use super::plan::{
-    Action, Area, Bit, Command, Condition, Counter, Deed, Form, Instance, Place, Plan, Policy, Row, Single, Task, Time,
-    Trigger, Value,
+    Action, Area, Bit, Command, Condition, Counter, Deed, Form, Home, Instance, Place, Plan, Policy, Row, Single, Task,
+    Time, Trigger, Value,
 };
 use crate::random::Random;
 
@@ -64,8 +64,7 @@ struct Generator {
 impl Generator {
     fn fill(&mut self) {
         let globals = self.random.between(2, 5) as usize;
-        let in_data = self.plan.form == Form::Assembly;
-        self.plan.globals = (0..globals).map(|_| in_data && self.random.chance(30)).collect();
+        self.plan.globals = (0..globals).map(|_| self.home()).collect();
         let programs = self.random.between(1, 5) as usize;
         self.plan.programs = (0..programs).map(|_| self.body(false)).collect();
         if self.plan.form == Form::BareText {
@@ -77,6 +76,14 @@ impl Generator {
         self.rows();
         self.world();
         self.commands();
+    }
+
+    fn home(&mut self) -> Home {
+        match self.plan.form {
+            Form::Assembly if self.random.chance(30) => Home::Data,
+            Form::Text | Form::BareText if self.random.chance(25) => Home::At(self.bit(false)),
+            _ => Home::Any,
+        }
     }
 
     /// What the front end makes of programs without a configuration.

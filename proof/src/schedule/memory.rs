@@ -24,11 +24,13 @@ impl Plan {
         if self.form == Form::BareText { format!("P{instance}") } else { format!("i{instance}") }
     }
 
-    /// Names of all variables: global counters, BOOL globals, each instance's own, bits.
+    /// Names of all variables: global counters, BOOL globals that are no bits, each instance's own, bits.
     #[must_use]
     pub fn names(&self) -> Vec<String> {
         let mut names: Vec<String> = GLOBAL_NAMES.iter().map(ToString::to_string).collect();
-        names.extend((0..self.globals.len()).map(|global| format!("b{global}")));
+        names.extend(
+            (0..self.globals.len()).filter(|global| self.located(*global).is_none()).map(|at| format!("b{at}")),
+        );
         for instance in 0..self.instances.len() {
             let of = self.instance_name(instance);
             names.extend(OWN_NAMES.iter().map(|own| format!("{of}.{own}")));
@@ -41,6 +43,7 @@ impl Plan {
 /// All variables by name.
 #[derive(Debug, Clone)]
 pub struct Memory {
+    plan: Plan,
     names: Vec<String>,
     values: BTreeMap<String, i64>,
 }
@@ -50,7 +53,7 @@ impl Memory {
     pub fn new(plan: &Plan) -> Self {
         let names = plan.names();
         let values = names.iter().map(|name| (name.clone(), 0)).collect();
-        Memory { names, values }
+        Memory { plan: plan.clone(), names, values }
     }
 
     /// The values in the order of the names.
@@ -99,12 +102,12 @@ impl Memory {
 
     /// A BOOL of an instance, or one that all see.
     pub fn read(&self, place: Place, instance: &str) -> bool {
-        self.get(&name_of(place, instance)) != 0
+        self.get(&self.name_of(place, instance)) != 0
     }
 
     /// Writes a BOOL.
     pub fn write(&mut self, place: Place, instance: &str, value: bool) {
-        self.set(&name_of(place, instance), i64::from(value));
+        self.set(&self.name_of(place, instance), i64::from(value));
     }
 
     /// The bytes of %Q, `length` of them.
@@ -178,19 +181,19 @@ impl Memory {
         }
     }
 
+    /// The whole name of a BOOL.
+    fn name_of(&self, place: Place, own: &str) -> String {
+        match place {
+            Place::Global(global) => self.plan.located(global).map_or_else(|| format!("b{global}"), Bit::address),
+            Place::Flag => format!("{own}.flag"),
+            Place::Source => format!("{own}.source"),
+            Place::Sink => format!("{own}.sink"),
+            Place::Bit(bit) => bit.address(),
+        }
+    }
+
     fn count(&self, counter: Counter, own: &str) -> i64 {
         self.get(&counter_name(counter, own))
-    }
-}
-
-/// The whole name of a BOOL.
-fn name_of(place: Place, own: &str) -> String {
-    match place {
-        Place::Global(global) => format!("b{global}"),
-        Place::Flag => format!("{own}.flag"),
-        Place::Source => format!("{own}.source"),
-        Place::Sink => format!("{own}.sink"),
-        Place::Bit(bit) => bit.address(),
     }
 }
 

@@ -72,6 +72,17 @@ pub enum Place {
     Bit(Bit),
 }
 
+/// Where a BOOL global lives.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Home {
+    /// Wherever the front end puts it; in assembly a slot.
+    Any,
+    /// In the data region (assembly only).
+    Data,
+    /// It is a bit of %Q or %M (Structured Text only).
+    At(Bit),
+}
+
 /// A counter that conditions look at.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Counter {
@@ -273,8 +284,8 @@ pub struct Plan {
     pub programs: Vec<Vec<Action>>,
     /// Program instances in declaration order.
     pub instances: Vec<Instance>,
-    /// How many BOOL globals there are, `b0` and so on; `true`: it lies in the data region (assembly only).
-    pub globals: Vec<bool>,
+    /// BOOL globals, `b0` and so on.
+    pub globals: Vec<Home>,
     /// Runs at load and reset (assembly only).
     pub init: Option<Vec<Action>>,
     /// Runs at each start.
@@ -303,6 +314,8 @@ impl Plan {
                 bits.push(bit);
             }
         };
+        // A global at a bit makes the bit, even if nobody uses it.
+        (0..self.globals.len()).filter_map(|global| self.located(global)).for_each(|bit| place(Place::Bit(bit)));
         let used = self.instances.iter().map(|instance| instance.program).collect::<Vec<_>>();
         let bodies = self.programs.iter().enumerate().filter(|(at, _)| used.contains(at)).map(|(_, body)| body);
         for action in bodies.chain(&self.init).chain(&self.startup).flatten() {
@@ -325,6 +338,15 @@ impl Plan {
         bits.sort_unstable();
         bits.dedup();
         bits
+    }
+
+    /// The bit that a global is, if it is one.
+    #[must_use]
+    pub fn located(&self, global: usize) -> Option<Bit> {
+        match self.globals.get(global) {
+            Some(Home::At(bit)) => Some(*bit),
+            _ => None,
+        }
     }
 
     /// Positions of a task's instances, in declaration order.

@@ -11,19 +11,17 @@ use super::plan::{
 #[must_use]
 pub fn print(plan: &Plan) -> String {
     let mut out = String::new();
-    out.push_str("VAR_GLOBAL\n  order : LINT; burnt : LINT;\n");
-    for global in 0..plan.globals.len() {
-        let _ = writeln!(out, "  b{global} : BOOL;");
+    if scope(plan) == Scope::Project {
+        print_globals(&mut out, plan, "VAR_GLOBAL");
     }
-    out.push_str("END_VAR\nVAR_GLOBAL RETAIN starts : LINT; END_VAR\n\n");
     for (name, actions) in [("initialise", &plan.init), ("prepare", &plan.startup)] {
         if let Some(actions) = actions {
-            print_function(&mut out, name, actions);
+            print_function(&mut out, plan, name, actions);
         }
     }
     for (at, actions) in plan.programs.iter().enumerate() {
         if plan.instances.iter().any(|instance| instance.program == at) {
-            print_program(&mut out, at, actions);
+            print_program(&mut out, plan, at, actions);
         }
     }
     if plan.form != Form::BareText {
@@ -32,13 +30,52 @@ pub fn print(plan: &Plan) -> String {
     out
 }
 
+/// Where the globals are declared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Scope {
+    Project,
+    Configuration,
+    Resource,
+}
+
+fn scope(plan: &Plan) -> Scope {
+    match plan.seed % 3 {
+        _ if plan.form == Form::BareText => Scope::Project,
+        0 => Scope::Project,
+        1 => Scope::Configuration,
+        _ => Scope::Resource,
+    }
+}
+
+/// The globals in blocks that begin with `word`, which is VAR_GLOBAL or VAR_EXTERNAL.
+fn print_globals(out: &mut String, plan: &Plan, word: &str) {
+    let declares = word == "VAR_GLOBAL";
+    let retain = if declares { " RETAIN" } else { "" };
+    let _ = write!(out, "{word}{retain} starts : LINT; END_VAR\n{word} order, burnt : LINT;");
+    for global in 0..plan.globals.len() {
+        let at =
+            plan.located(global).filter(|_| declares).map_or(String::new(), |bit| format!(" AT {}", bit.address()));
+        let _ = write!(out, " b{global}{at} : BOOL;");
+    }
+    out.push_str(" END_VAR\n");
+}
+
+/// A POU may say which globals it uses; it need not.
+fn print_externals(out: &mut String, plan: &Plan) {
+    if plan.seed % 2 == 1 {
+        print_globals(out, plan, "VAR_EXTERNAL");
+    }
+}
+
 /// Init function (which Structured Text has no way to say, so it is for people only) or startup function.
-fn print_function(out: &mut String, name: &str, actions: &[Action]) {
+fn print_function(out: &mut String, plan: &Plan, name: &str, actions: &[Action]) {
     let is_init = name == "initialise";
     if !is_init {
         out.push_str("{attribute 'startup'}\n");
     }
-    let _ = writeln!(out, "FUNCTION {name} : BOOL\nVAR pass : DINT; END_VAR");
+    let _ = writeln!(out, "FUNCTION {name} : BOOL");
+    print_externals(out, plan);
+    out.push_str("VAR pass : DINT; END_VAR\n");
     if is_init {
         let _ = writeln!(out, "  starts := {INIT_STARTS};\n  order := {INIT_ORDER};");
     } else {
@@ -48,8 +85,9 @@ fn print_function(out: &mut String, name: &str, actions: &[Action]) {
     out.push_str("END_FUNCTION\n\n");
 }
 
-fn print_program(out: &mut String, at: usize, actions: &[Action]) {
+fn print_program(out: &mut String, plan: &Plan, at: usize, actions: &[Action]) {
     let _ = writeln!(out, "PROGRAM P{at}");
+    print_externals(out, plan);
     out.push_str("VAR_INPUT source : BOOL; END_VAR\nVAR_OUTPUT sink : BOOL; END_VAR\n");
     out.push_str("VAR runs, seen, done, spent : LINT; time : LTIME; time_ms : TIME; flag : BOOL; END_VAR\n");
     out.push_str("VAR RETAIN kept : LINT; END_VAR\nVAR pass : DINT; END_VAR\n");
@@ -113,7 +151,14 @@ fn print_place(place: Place) -> String {
 }
 
 fn print_configuration(out: &mut String, plan: &Plan) {
-    out.push_str("CONFIGURATION plant\n  RESOURCE cpu ON PLC\n");
+    out.push_str("CONFIGURATION plant\n");
+    if scope(plan) == Scope::Configuration {
+        print_globals(out, plan, "VAR_GLOBAL");
+    }
+    out.push_str("  RESOURCE cpu ON PLC\n");
+    if scope(plan) == Scope::Resource {
+        print_globals(out, plan, "VAR_GLOBAL");
+    }
     let without = plan.instances.iter().any(|instance| instance.task.is_none());
     let written = plan.tasks.len() - usize::from(without);
     for (at, task) in plan.tasks.iter().take(written).enumerate() {

@@ -461,9 +461,7 @@ impl Bench<'_> {
                     Held::Faulted(_) => None,
                 };
                 let shared = lock(&self.link);
-                let name = format!("b{global}");
-                let at = self.plan.names().iter().position(|known| *known == name);
-                let variable = at.and_then(|at| shared.variables[at].clone());
+                let variable = shared.names.resolve(&format!("b{global}")).ok();
                 if let (Some(image), Some(variable)) = (image, variable) {
                     let literal = if value { "TRUE" } else { "FALSE" };
                     shared.names.write(image, &variable, literal).expect("a BOOL");
