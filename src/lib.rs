@@ -13,6 +13,7 @@
 //! The binary `khz` is in `src/main.rs`, a file for each subcommand in `src/cli/`.
 
 pub mod files;
+pub mod inputs;
 pub mod lockstep;
 pub mod pipeline;
 pub mod project;

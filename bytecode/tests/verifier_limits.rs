@@ -11,7 +11,7 @@ use khz_bytecode::value::*;
 use khz_bytecode::verify::*;
 
 /// Generous for a debug build on a busy machine; quadratic behaviour would take minutes.
-const PATIENCE: Duration = Duration::from_secs(20);
+const PATIENCE: Duration = Duration::from_secs(60);
 
 fn main_of(code: Vec<u8>, max_stack_depth: u16) -> Container {
     let mut container = assemble("global x i32\nglobal y i32\nfunction main\n return\nend\n").unwrap();
@@ -140,6 +140,94 @@ fn hostile_instance_tables_are_refused_quickly() {
     assert_eq!(timed(container.clone()).unwrap_err().rule, Rule::BlockInstances);
     container.types.block_instances.clear();
     assert_eq!(timed(container).unwrap_err().rule, Rule::BlockInstances);
+}
+
+/// Every instance claims all slots: comparing them all with those of the program type would take minutes.
+#[test]
+fn overlapping_partitions_are_refused_quickly() {
+    let mut container = main_of(encode(&[Instruction::Return {}]), 16);
+    container.types.slots = vec![Storage::I32; 60_000];
+    container.tasks =
+        TaskTable { shared_globals: 0, tasks: vec![Task { interval_us: 1, ..Task::default() }], instances: Vec::new() };
+    container.types.task_extensions = vec![TaskExtension::default()];
+    container.types.programs = vec![ProgramType { slots: vec![Storage::I32; 60_000], block: None }];
+    container.functions[0].owner = Owner::Program(ProgramId(0));
+    container.tasks.instances = (0..60_000)
+        .map(|id| ProgramInstance { id: InstanceId(id), slot_count: 60_000, ..ProgramInstance::default() })
+        .collect();
+    assert_eq!(timed(container).unwrap_err().rule, Rule::InstancePartition);
+}
+
+/// A run of initial bytes whose length fits no stride: hundreds of millions of floats that all begin otherwise.
+#[test]
+fn initial_values_of_nested_arrays_are_limited_in_total() {
+    let array =
+        |element, stride, count| ArrayDescriptor { element: TypeId(element), stride, dimensions: vec![(1, count)] };
+    let mut container = main_of(encode(&[Instruction::Return {}]), 16);
+    let types = &mut container.types;
+    types.types = vec![Type::Scalar(Storage::F32), Type::Array(ArrayId(0)), Type::Array(ArrayId(1))];
+    types.arrays = vec![array(0, 4, 10_008), array(1, 40_032, 10_007)];
+    types.data = vec![DataVariable { offset: 16, ty: TypeId(2), constant: false }];
+    let bytes = 40_032 * 10_007;
+    container.parameters.data_region_bytes = bytes + 16;
+    let run = |length: u32| InitRun {
+        region: Region::Data,
+        offset: 16,
+        repeat: bytes / length,
+        bytes: vec![0; length as usize],
+    };
+    container.types.init_image = vec![run(40_028)];
+    assert_eq!(timed(container.clone()).unwrap_err().rule, Rule::AnalysisSize);
+    // Honest runs repeat whole elements, and need few looks.
+    for length in [4, 40_032] {
+        container.types.init_image = vec![run(length)];
+        timed(container.clone()).unwrap();
+    }
+}
+
+/// Few blocks with high stacks, and very many ways between them.
+#[test]
+fn stacks_along_edges_are_limited_in_total() {
+    let push = Instruction::ConstI32 { value: 1 };
+    let (height, arms, switches) = (4000, 1000, 400);
+    // Each arm goes on behind the next one; each switch leads to all arms.
+    let prologue = size(std::slice::from_ref(&push)) * height;
+    let one = size(&[push.clone(), Instruction::Switch { targets: vec![Label(0); arms as usize + 1] }]);
+    let first_arm = prologue + one * switches;
+    let arm = size(&[Instruction::Jump { target: Label(0) }]);
+    let mut code = encode(&vec![push.clone(); height as usize]);
+    for number in 1..=switches {
+        let targets = (0..arms).map(|at| Label(first_arm + at * arm)).chain([Label(prologue + one * number)]).collect();
+        code.extend(encode(&[push.clone(), Instruction::Switch { targets }]));
+    }
+    for at in 1..=arms {
+        code.extend(encode(&[Instruction::Jump { target: Label(first_arm + at * arm) }]));
+    }
+    code.extend(encode(&vec![Instruction::Drop {}; height as usize]));
+    code.extend(encode(&[Instruction::Return {}]));
+    assert_eq!(timed(main_of(code, 4096)).unwrap_err().rule, Rule::AnalysisSize);
+}
+
+/// Accesses into a union of many alternatives, each a deep structure: all of them are tried for each access.
+#[test]
+fn lookups_in_unions_are_limited_in_total() {
+    let field = |ty| Field { offset: 0, ty: TypeId(ty) };
+    let mut container = main_of(Vec::new(), 16);
+    let mut types = vec![Type::Scalar(Storage::I32)];
+    for ty in 0..61 {
+        types.push(Type::Struct(Record { size: 4, align: 4, fields: vec![field(ty)] }));
+    }
+    types.push(Type::Union(Record { size: 4, align: 4, fields: vec![field(61); 255] }));
+    types.push(Type::Scalar(Storage::F32));
+    types.push(Type::Union(Record { size: 4, align: 4, fields: vec![field(63), field(62)] }));
+    container.types.types = types;
+    container.types.data = vec![DataVariable { offset: 16, ty: TypeId(64), constant: false }];
+    container.parameters.data_region_bytes = 32;
+    let load = Instruction::Load { place: BytePlace::Data, storage: Storage::F32, offset: 16 };
+    let mut code = encode(&vec![[load, Instruction::Drop {}]; 200_000].concat());
+    code.extend(encode(&[Instruction::Return {}]));
+    container.functions[0].code = code;
+    assert_eq!(timed(container).unwrap_err().rule, Rule::AnalysisSize);
 }
 
 /// Small deterministic generator (xorshift).

@@ -9,7 +9,7 @@ use kilohertz::pipeline::{EngineKind, Program};
 
 use super::Status;
 use super::args::ResourceArgs;
-use super::inputs::{CsvInputs, set_values};
+use super::inputs::{CsvInputs, read_csv, set_values};
 use super::output::Failure;
 
 /// A program and what the command line gives it.
@@ -76,6 +76,6 @@ impl<'a> Session<'a> {
 
     /// The rows of `--inputs`, checked against the image.
     pub fn inputs(&self, image: &Image) -> Result<Option<CsvInputs>, Failure> {
-        self.args.inputs.as_ref().map(|path| CsvInputs::read(path, &self.names, image)).transpose()
+        self.args.inputs.as_ref().map(|path| read_csv(path, &self.names, image)).transpose()
     }
 }

@@ -280,13 +280,15 @@ pub(super) fn check_retain(container: &Container) -> Check {
 pub(super) fn check_init(container: &Container, types: &TypeTable<'_>) -> Check {
     let runs = &container.types.init_image;
     let bytes = |run: &InitRun| (run.bytes.len() as u64).saturating_mul(u64::from(run.repeat));
+    // An honest run repeats whole values, so there are no more different places of a float in it than it has bytes.
+    let mut steps = runs.iter().fold(MAX_BLOCK_INSTANCES, |steps, run| steps.saturating_add(2 * run.bytes.len()));
     check_ranges(container, Rule::InitLayout, "init", runs.iter().map(|run| (run.region, run.offset, bytes(run))))?;
     for (index, run) in runs.iter().enumerate() {
         // `check_ranges` held the end inside a region of at most 2 GiB.
         let end = run.offset + bytes(run) as u32;
         match run.region {
             Region::Slots => check_init_slots(container, index, run.offset..end)?,
-            Region::Data => check_init_data(container, types, index, run.offset..end)?,
+            Region::Data => check_init_data(container, types, index, run.offset..end, &mut steps)?,
             Region::Memory | Region::Output => {}
         }
     }
@@ -314,13 +316,19 @@ fn check_init_slots(container: &Container, index: usize, range: std::ops::Range<
     Ok(())
 }
 
-fn check_init_data(container: &Container, types: &TypeTable<'_>, index: usize, range: std::ops::Range<u32>) -> Check {
+fn check_init_data(
+    container: &Container,
+    types: &TypeTable<'_>,
+    index: usize,
+    range: std::ops::Range<u32>,
+    steps: &mut usize,
+) -> Check {
     let data = &container.types.data;
     let first = data.partition_point(|variable| variable.offset <= range.start).saturating_sub(1);
     let period = container.types.init_image.get(index).map_or(1, |run| run.bytes.len());
     let period = u32::try_from(period).unwrap_or(u32::MAX);
     for variable in data.iter().skip(first).take_while(|variable| variable.offset < range.end) {
-        types.floats(variable.ty, variable.offset, &range, period, &mut |offset, storage| {
+        types.floats(variable.ty, variable.offset, &range, period, steps, &mut |offset, storage| {
             let value = u64::from_le_bytes(initial_bytes(container, Region::Data, offset));
             let foreign = match storage {
                 Storage::F32 => is_foreign_f32(value as u32),
@@ -332,6 +340,10 @@ fn check_init_data(container: &Container, types: &TypeTable<'_>, index: usize, r
             let message = format!("the float at offset {offset} of the data region is a NaN, but not the one NaN");
             Err(VerifyError::entry(Rule::InitValue, "init", index, message))
         })?;
+        if *steps == 0 {
+            let message = "its bytes repeat at another distance than the floats they stand for, in too many places";
+            return Err(VerifyError::entry(Rule::AnalysisSize, "init", index, message));
+        }
     }
     Ok(())
 }

@@ -164,6 +164,9 @@ impl<'a, 'c> Scope<'a, 'c> {
             }
         };
         if !self.types.meets(root, inside, wanted) {
+            if self.types.gave_up() {
+                return Err((Rule::AnalysisSize, "the lookups in unions are too many".into()));
+            }
             return Err((Rule::TypedAccess, format!("{} does not stand at {place} {offset}", describe(wanted))));
         }
         if constant && write {

@@ -20,6 +20,7 @@ pub(super) fn check_tasks(container: &Container, types: &TypeTable<'_>) -> Check
     let mut programs = Vec::new();
     let mut ids = BTreeSet::new();
     let known: BTreeSet<_> = container.tasks.tasks.iter().map(|task| task.id).collect();
+    let mut claimed = 0;
     for (index, instance) in container.tasks.instances.iter().enumerate() {
         let error = |rule, message: String| Err(VerifyError::entry(rule, "instance", index, message));
         if !ids.insert(instance.id) {
@@ -27,6 +28,13 @@ pub(super) fn check_tasks(container: &Container, types: &TypeTable<'_>) -> Check
         }
         if !known.contains(&instance.task) {
             return error(Rule::InstanceTask, format!("there is no task {}", instance.task));
+        }
+        // Partitions that are apart claim no more slots than there are. Whoever claims more is refused before all of them are looked at.
+        claimed += usize::from(instance.slot_count);
+        if claimed > container.types.slots.len() {
+            let message =
+                format!("the instances up to this one have {claimed} slots among {}", container.types.slots.len());
+            return error(Rule::InstancePartition, message);
         }
         programs.push(check_instance(container, index, instance)?);
     }

@@ -1,11 +1,13 @@
 //! Types: their structure is sound, and what follows from it (extents, what lies at an offset, the blocks inside).
 
+use std::cell::Cell;
+
 use super::error::{Check, VerifyError};
 use super::facts::Extent;
 use super::rules::Rule;
 use crate::container::{ArrayDescriptor, BlockInstance, DataVariable, Record, Type, TypeSection};
 use crate::ids::TypeId;
-use crate::limits::{MAX_DIMENSIONS, MAX_RESULTS, MAX_TYPE_DEPTH, MAX_UNION_ALTERNATIVES};
+use crate::limits::{MAX_ANALYSIS_ENTRIES, MAX_DIMENSIONS, MAX_RESULTS, MAX_TYPE_DEPTH, MAX_UNION_ALTERNATIVES};
 use crate::value::{LocalType, Storage};
 
 /// What is known of one type beside its extent.
@@ -39,12 +41,15 @@ pub(super) struct TypeTable<'c> {
     section: &'c TypeSection,
     extents: Vec<Extent>,
     traits: Vec<Traits>,
+    /// Steps left for trying the alternatives of unions, in all lookups together.
+    tries: Cell<usize>,
 }
 
 impl<'c> TypeTable<'c> {
     /// Checks the structure of every type and array descriptor.
     pub(super) fn new(section: &'c TypeSection) -> Check<Self> {
-        let mut table = TypeTable { section, extents: Vec::new(), traits: Vec::new() };
+        let mut table =
+            TypeTable { section, extents: Vec::new(), traits: Vec::new(), tries: Cell::new(MAX_ANALYSIS_ENTRIES) };
         for (index, ty) in section.types.iter().enumerate() {
             let (extent, traits) = table.examine(index, ty)?;
             if traits.depth > MAX_TYPE_DEPTH {
@@ -305,13 +310,24 @@ impl<'c> TypeTable<'c> {
         false
     }
 
-    /// Whether `offset` inside `root` is the place of what is `wanted`.
+    /// Whether [`TypeTable::meets`] had to give up: there were too many alternatives of unions to try.
+    pub(super) fn gave_up(&self) -> bool {
+        self.tries.get() == 0
+    }
+
+    /// Whether `offset` inside `root` is the place of what is `wanted`. With unions it may give up, and then says no.
     pub(super) fn meets(&self, root: TypeId, offset: u32, wanted: Wanted) -> bool {
         let mut pending = Vec::new();
         let mut next = Some((root, offset));
         while let Some((ty, offset)) = next {
             if offset == 0 && self.is_wanted(ty, wanted) {
                 return true;
+            }
+            if !pending.is_empty() {
+                self.tries.set(self.tries.get().saturating_sub(1));
+                if self.gave_up() {
+                    return false;
+                }
             }
             next = match self.get(ty) {
                 Some(Type::Array(array)) => self.section.arrays.get(array.index()).and_then(|array| {
@@ -349,17 +365,20 @@ impl<'c> TypeTable<'c> {
 
     /// Calls `visit` with the offset and storage of every float that touches `range` of a variable of type `ty` at `offset`, floats in
     /// unions aside (they are canonicalised when loaded). Of the elements of an array that lie in the range whole, only the
-    /// first `period / gcd(period, stride)` are visited: with bytes that repeat every `period`, the others look the same.
+    /// first `period / gcd(period, stride)` are visited: with bytes that repeat every `period`, the others look the same. Each step counts down `steps`; at
+    /// 0 the walk ends, and what was not visited is not known.
     pub(super) fn floats<E>(
         &self,
         ty: TypeId,
         offset: u32,
         range: &std::ops::Range<u32>,
         period: u32,
+        steps: &mut usize,
         visit: &mut dyn FnMut(u32, Storage) -> Result<(), E>,
     ) -> Result<(), E> {
         let end = offset.saturating_add(self.size(ty));
-        if !self.has_float(ty) || offset >= range.end || end <= range.start {
+        *steps = steps.saturating_sub(1);
+        if !self.has_float(ty) || offset >= range.end || end <= range.start || *steps == 0 {
             return Ok(());
         }
         match self.get(ty) {
@@ -368,7 +387,7 @@ impl<'c> TypeTable<'c> {
                 let first =
                     record.fields.partition_point(|field| offset + field.offset <= range.start).saturating_sub(1);
                 for field in record.fields.iter().skip(first).take_while(|field| offset + field.offset < range.end) {
-                    self.floats(field.ty, offset + field.offset, range, period, visit)?;
+                    self.floats(field.ty, offset + field.offset, range, period, steps, visit)?;
                 }
                 Ok(())
             }
@@ -383,7 +402,10 @@ impl<'c> TypeTable<'c> {
                 let head = first..=last.min(first.saturating_add(distinct));
                 let tail = (*head.end() + 1).max(last)..=last;
                 for element in head.chain(tail) {
-                    self.floats(array.element, offset + element * stride, range, period, visit)?;
+                    self.floats(array.element, offset + element * stride, range, period, steps, visit)?;
+                    if *steps == 0 {
+                        break;
+                    }
                 }
                 Ok(())
             }

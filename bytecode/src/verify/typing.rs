@@ -139,11 +139,12 @@ impl<'s, 'a, 'c> Typer<'s, 'a, 'c> {
     ) -> Result<(), Broken> {
         let target = &mut blocks[to.index()];
         let is_first = target.predecessors.first().is_some_and(|first| first.index() == from) && to.index() > from;
+        // Every edge counts: the same few blocks may have very many ways between them.
+        *entries += self.stack.len();
+        if *entries > MAX_ANALYSIS_ENTRIES {
+            return Err((Rule::AnalysisSize, "the stacks at block starts are too many".into()));
+        }
         if is_first {
-            *entries += self.stack.len();
-            if *entries > MAX_ANALYSIS_ENTRIES {
-                return Err((Rule::AnalysisSize, "the stacks at block starts are too many".into()));
-            }
             target.entry_stack = self.stack.iter().map(|entry| entry.ty).collect();
         } else if !target.entry_stack.iter().eq(self.stack.iter().map(|entry| &entry.ty)) {
             let message = format!(
