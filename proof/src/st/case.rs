@@ -24,6 +24,8 @@ pub struct Round {
     pub wait_ns: i64,
     /// Values from outside.
     pub inputs: Vec<Input>,
+    /// The first bytes of %I; those behind are 0.
+    pub image: Vec<u8>,
 }
 
 /// A program and its rounds.
@@ -35,6 +37,8 @@ pub struct Case {
     pub rounds: Vec<Round>,
 }
 
+/// Bytes of %I that come from outside; the generator puts no variable behind them.
+const IMAGE_BYTES: usize = 64;
 /// Most values that come from outside before one round.
 const MOST_INPUTS: usize = 3;
 
@@ -51,7 +55,8 @@ impl Case {
         }
         let mut made = Vec::new();
         for round in 0..rounds {
-            let mut next = Round::default();
+            let image = (0..IMAGE_BYTES).map(|_| if random.chance(30) { 0xFF } else { random.bits() as u8 }).collect();
+            let mut next = Round { image, ..Round::default() };
             if round > 0 {
                 next.wait_ns = random.one_of([0, 1, 10_000_000, 7_500_000, 20_000_001]);
                 for _ in 0..random.below(MOST_INPUTS + 1) {
@@ -86,6 +91,11 @@ pub fn inputs_text(rounds: &[Round]) -> String {
             events.push(format!("{} ns later", round.wait_ns));
         }
         events.extend(round.inputs.iter().map(|input| format!("{} := {}", input.name, input.literal)));
+        let bytes = round.image.iter().rposition(|byte| *byte != 0).map_or(0, |last| last + 1);
+        if bytes > 0 {
+            let bytes: Vec<String> = round.image[..bytes].iter().map(|byte| format!("{byte:02X}")).collect();
+            events.push(format!("%I begins with the bytes {}", bytes.join(" ")));
+        }
         if !events.is_empty() {
             text += &format!("before round {number}: {}\n", events.join("; "));
         }

@@ -300,6 +300,9 @@ enum Ran {
 /// The time and the values from outside.
 fn give(image: &mut Image, names: &VariableTable, container: &Container, round: &Round, now: i64) {
     set_time(image, container, now);
+    let bytes = image.layout().input.start as usize..image.layout().input.end as usize;
+    let given = round.image.iter().copied().chain(std::iter::repeat(0));
+    image.bytes_mut()[bytes].iter_mut().zip(given).for_each(|(byte, given)| *byte = given);
     for input in &round.inputs {
         if let Ok(variable) = names.resolve(&input.name) {
             // A variable that the shrinker made narrower may not take a value; then it keeps its own, in every engine.

@@ -123,6 +123,18 @@ impl Editor {
             if round.wait_ns != 0 && self.here() {
                 round.wait_ns = 0;
             }
+            if !round.image.is_empty() && self.here() {
+                round.image.clear();
+            }
+            let half = round.image.len() / 2;
+            if half > 0 && self.here() {
+                round.image.truncate(half);
+            }
+            for byte in &mut round.image {
+                if *byte != 0 && self.here() {
+                    *byte = 0;
+                }
+            }
         }
     }
 
