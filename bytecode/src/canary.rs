@@ -27,8 +27,8 @@ macro_rules! faults {
 }
 
 faults! {
-    (Interp, "The interpreter rotates a 16-bit value by a count of its width or more as if the count were one larger."),
-    (Jit, "The native engine takes a range-checked index as proven up to one past the upper bound of its array."),
+    (Interp, "The interpreter rotates a 16-bit value by a constant count of its width or more as if the count were one larger."),
+    (Jit, "The native engine leaves out the wrap to BOOL of a value that is known to fit USINT."),
     (Verifier, "The verifier takes a FOR loop's control variable as proven although a function called in the body writes it."),
     (Scheduler, "The scheduler counts a cycle that is collected exactly one interval late as not missed."),
     (Frontend, "The front end sign-extends a USINT where it is converted to a wider type."),

@@ -22,6 +22,7 @@ pub mod campaign;
 pub mod evaluator;
 pub mod mutate;
 pub mod oracle;
+pub mod panics;
 pub mod random;
 pub mod round_trip;
 pub mod schedule;

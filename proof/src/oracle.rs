@@ -14,6 +14,7 @@ use khz_machine::image::{Image, ImageLayout};
 use khz_machine::trap::{Trap, TrapCode};
 
 use crate::evaluator::Evaluator;
+use crate::panics::caught;
 use crate::random::Random;
 use crate::statistics::Statistics;
 
@@ -69,10 +70,13 @@ impl Default for Plan {
     }
 }
 
+/// The name under which a difference stands that the evaluator finds alone: what it was handed was not what a verifier promises.
+pub const VERIFIER: &str = "verifier";
+
 /// A difference between two engines.
 #[derive(Debug, Clone)]
 pub struct Difference {
-    /// The engine that is not like the evaluator.
+    /// The engine that is not like the evaluator, or [`VERIFIER`].
     pub engine: String,
     /// What differs, for people.
     pub description: String,
@@ -161,15 +165,14 @@ pub fn compare(verified: &Arc<Verified>, makers: &[Maker<'_>], plan: &Plan, stat
     let Ok(layout) = ImageLayout::new(verified.container(), plan.image_limit_bytes) else { return Outcome::TooLarge };
     let first = Image::new(layout.clone(), verified.container());
     let mut evaluator = Evaluator::new(verified.clone(), &layout, true);
-    let mut series = vec![reference(&mut evaluator, &first, plan, verified, None)];
+    let series = match caught(|| references(&mut evaluator, &first, plan, verified)) {
+        Ok(series) => series,
+        Err(words) => {
+            let description = format!("the evaluator finds that the verifier is wrong: {words}");
+            return Outcome::Different(Difference { engine: VERIFIER.to_string(), description });
+        }
+    };
     let ended = series[0].iter().all(|step| !matches!(step.result, Err(trap) if trap.code == TrapCode::Watchdog));
-    let mut random = Random::new(plan.seed ^ 0x4355_5453);
-    for cut in 0..plan.cuts {
-        let spent: Vec<u64> = series[0].iter().map(|step| step.fuel - step.left).collect();
-        let most = spent.iter().copied().max().unwrap_or(0);
-        let fuel = random.below(most as usize + 1) as u64;
-        series.push(reference(&mut evaluator, &first, plan, verified, Some((fuel, cut == 0))));
-    }
     note(statistics, &series, ended, verified, &evaluator);
     for maker in makers {
         let forms: &[bool] = match (maker.forms, ended) {
@@ -178,14 +181,15 @@ pub fn compare(verified: &Arc<Verified>, makers: &[Maker<'_>], plan: &Plan, stat
             (_, false) => &[true],
         };
         for with_fuel in forms.iter().copied() {
-            let failure = match (maker.make)(verified.clone(), &layout, with_fuel) {
+            let failure = caught(|| match (maker.make)(verified.clone(), &layout, with_fuel) {
                 Err(reason) => Some(format!("it can not be made: {reason}")),
                 Ok(mut engine) => {
                     // Without fuel only the series that came to its end by itself is comparable.
                     let repeated = if with_fuel { &series[..] } else { &series[..1] };
                     repeated.iter().find_map(|steps| repeat(&mut *engine, &first, plan, steps, with_fuel, verified))
                 }
-            };
+            });
+            let failure = failure.unwrap_or_else(|words| Some(format!("it panics: {words}")));
             if let Some(description) = failure {
                 let form = if with_fuel { "with" } else { "without" };
                 let description = format!("{} ({form} fuel) is not like the evaluator: {description}", maker.name);
@@ -194,6 +198,18 @@ pub fn compare(verified: &Arc<Verified>, makers: &[Maker<'_>], plan: &Plan, stat
         }
     }
     Outcome::Equal
+}
+
+/// All series of a plan in the evaluator: the whole one first, then those that are cut short.
+fn references(evaluator: &mut Evaluator, first: &Image, plan: &Plan, verified: &Verified) -> Vec<Vec<Step>> {
+    let mut series = vec![reference(evaluator, first, plan, verified, None)];
+    let mut random = Random::new(plan.seed ^ 0x4355_5453);
+    for cut in 0..plan.cuts {
+        let most = series[0].iter().map(|step| step.fuel - step.left).max().unwrap_or(0);
+        let fuel = random.below(most as usize + 1) as u64;
+        series.push(reference(evaluator, first, plan, verified, Some((fuel, cut == 0))));
+    }
+    series
 }
 
 fn reference(

@@ -9,6 +9,7 @@ use super::scope::Scope;
 use super::touch::TouchKind;
 use super::types::Wanted;
 use super::typing::Draft;
+use crate::canary::{Fault, planted};
 use crate::container::{ControlPlace, ForLoop, Owner, Type};
 use crate::ids::{ForId, TypeId};
 use crate::value::{BytePlace, SlotPlace, Storage};
@@ -59,6 +60,9 @@ struct Proof<'s, 'a, 'c> {
 
 impl Proof<'_, '_, '_> {
     fn keeps(&self, touch: TouchKind) -> bool {
+        if planted(Fault::Verifier) && matches!(touch, TouchKind::Call { .. }) {
+            return true;
+        }
         match (self.descriptor.control, touch) {
             (ControlPlace::Slot(place, slot), TouchKind::SlotWrite(to, written)) => (place, slot) != (to, written),
             (ControlPlace::Slot(place, slot), TouchKind::Call { function: callee, .. }) => {

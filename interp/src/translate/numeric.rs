@@ -1,5 +1,6 @@
 //! Numbers: numeric rows, constants, range checks, string helpers.
 
+use khz_bytecode::canary::{Fault, planted};
 use khz_bytecode::container::Constant;
 use khz_bytecode::ids::ConstantId;
 use khz_bytecode::instruction::{HelperOp, MAX_CAPACITIES, NumericOp};
@@ -215,7 +216,10 @@ impl Translator<'_> {
     fn own_operand(&mut self, op: NumericOp, bits: u64) -> u32 {
         match op.operands().last() {
             Some(ValueType::I64 | ValueType::F64) => self.constant_number(bits),
-            _ => bits as u32,
+            _ => {
+                let goes_round = matches!(op, NumericOp::I32Rotl16 | NumericOp::I32Rotr16) && bits as u32 >= 16;
+                (bits as u32).wrapping_add(u32::from(planted(Fault::Interp) && goes_round))
+            }
         }
     }
 

@@ -2,6 +2,7 @@
 //!
 //! Operations are computed by the same functions that define them. An operation that would trap stays: its guard traps at run time.
 
+use khz_bytecode::canary::{Fault, planted};
 use khz_bytecode::instruction::NumericOp;
 use khz_bytecode::value::{Storage, ValueType};
 use khz_machine::semantics::{Value as Number, eval_numeric};
@@ -71,6 +72,7 @@ impl Fold {
     /// Whether a wrap's operand is in the range already.
     fn changes_nothing(&self, op: NumericOp, operand: Value) -> bool {
         let storage = match op {
+            NumericOp::I32Nez if planted(Fault::Jit) => Storage::U8,
             NumericOp::I32Nez => Storage::Bool,
             NumericOp::I32Extend8S => Storage::I8,
             NumericOp::I32Extend8U => Storage::U8,

@@ -2,7 +2,7 @@
 //!
 //! It shares no code with the engines: integers are computed in 128 bits, strings on copies, references carry their
 //! types. Its only aim is that a reader can hold it against the document. Where the verifier's promise is broken (a wrong type on the
-//! stack, an access outside the image), it panics: that is a finding in the verifier, and the panic is its report.
+//! stack, an access outside the image, a control variable that was proven to be kept and is not), it panics: that is a finding in the verifier, and the panic is its report.
 
 mod numeric;
 mod step;
@@ -175,6 +175,8 @@ struct Activation {
     /// The instruction that runs now; in a caller, its call.
     at: usize,
     locals: Vec<Local>,
+    /// For each FOR loop, what its last `for.enter` or `for.next` left in the control variable.
+    controls: Vec<i64>,
     /// Image offset of its frame bytes.
     frame: u32,
     /// Image offset of the instance it was called on.
@@ -262,7 +264,8 @@ impl Run<'_> {
         let locals = function.locals.iter().map(fresh).collect();
         let parameters = usize::from(function.parameters);
         let base = self.stack.len() - parameters;
-        self.calls.push(Activation { function: id, at: 0, locals, frame, this, base });
+        let controls = vec![0; function.for_loops.len()];
+        self.calls.push(Activation { function: id, at: 0, locals, controls, frame, this, base });
         for index in (0..parameters).rev() {
             self.store_local(index);
         }

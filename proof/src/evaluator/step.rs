@@ -6,6 +6,7 @@ use khz_bytecode::instruction::{HelperOp, HelperOperand, Instruction, MAX_CAPACI
 use khz_bytecode::limits::SLOT_BYTES;
 use khz_bytecode::trap::TrapCode;
 use khz_bytecode::value::{BytePlace, IntegerType, RefType, SlotPlace, StackType, Storage, ValueType};
+use khz_bytecode::verify::Loop;
 use khz_machine::semantics::{StringPlace, Value, load_scalar, store_scalar};
 
 use super::{Item, Run, Stop, numeric, stop, strings};
@@ -335,6 +336,7 @@ impl Run<'_> {
         }
         self.set_control(descriptor.control, ty, initial);
         let control = self.control_value(descriptor.control, ty);
+        self.top().controls[number] = control;
         let (control, bound) = (ordered(ty, control), ordered(ty, bound));
         Ok(if step > 0 { control <= bound } else { control >= bound })
     }
@@ -350,7 +352,13 @@ impl Run<'_> {
             Item::Value(Value::I64(value)) => value,
             other => panic!("{other:?} in a FOR slot"),
         });
+        let is_proven = |found: &Loop| found.for_loop.is_some_and(|id| id.index() == number) && found.control_is_proven;
+        if self.verified.function(id).loops.iter().any(is_proven) {
+            assert_eq!(control, self.top().controls[number], "a proven control variable was written in its loop");
+        }
         self.set_control(descriptor.control, ty, control.wrapping_add(kept[1]));
+        let next = self.control_value(descriptor.control, ty);
+        self.top().controls[number] = next;
         let (control, bound, step) = (ordered(ty, control), ordered(ty, kept[0]), i128::from(kept[1]));
         if step > 0 {
             control <= bound && bound - control >= step
