@@ -207,8 +207,12 @@ pub struct Assembly {
     signatures: Box<dyn Fn(Key) -> Signature + Send>,
     routines: BTreeMap<&'static str, FuncId>,
     places: Vec<PlaceEntry>,
-    /// For each function that is at hand: local place to table position.
+    /// For the form that is at hand: local place to table position.
     known_places: BTreeMap<Place, u32>,
+    /// Parts of the function that is at hand.
+    parts: BTreeMap<u32, FuncId>,
+    /// Bytes of native stack of each, with what it calls of them.
+    part_stack_bytes: Vec<u32>,
     bytes: usize,
     stack_bytes: BTreeMap<Key, u32>,
     failure: Option<JitError>,
@@ -241,6 +245,8 @@ impl Assembly {
             routines: BTreeMap::new(),
             places: Vec::new(),
             known_places: BTreeMap::new(),
+            parts: BTreeMap::new(),
+            part_stack_bytes: Vec::new(),
             bytes: 0,
             stack_bytes: BTreeMap::new(),
             failure: None,
@@ -253,30 +259,75 @@ impl Assembly {
         self.module.make_context()
     }
 
-    /// Forgets the places of the function before.
+    /// Forgets the parts of the function before.
     pub fn start_function(&mut self) {
+        self.parts.clear();
+        self.part_stack_bytes.clear();
+        self.start_form();
+    }
+
+    /// Forgets the places of the form before.
+    pub fn start_form(&mut self) {
         self.known_places.clear();
     }
 
-    /// Compiles a lowered function.
+    /// Compiles a lowered function. `parts`: which of its parts it calls itself.
     ///
     /// # Errors
     /// Code that Cranelift refuses.
-    pub fn define(&mut self, key: Key, compilation: &mut Compilation) -> Result<(), JitError> {
+    pub fn define(&mut self, key: Key, compilation: &mut Compilation, parts: &[u32]) -> Result<(), JitError> {
         let id = self.declare(key).map_err(|error| self.failed(key, error))?;
+        let stack_bytes = self.define_form(key, id, compilation, parts)?;
+        self.stack_bytes.insert(key, stack_bytes);
+        Ok(())
+    }
+
+    /// Compiles a lowered part of a function, the next one. `parts`: which other parts it calls itself.
+    ///
+    /// # Errors
+    /// Code that Cranelift refuses.
+    pub fn define_part(&mut self, key: Key, compilation: &mut Compilation, parts: &[u32]) -> Result<(), JitError> {
+        let number = self.part_stack_bytes.len() as u32;
+        let id = self.declare_part(number, &compilation.func.signature).map_err(|error| self.failed(key, error))?;
+        let stack_bytes = self.define_form(key, id, compilation, parts)?;
+        self.part_stack_bytes.push(stack_bytes);
+        Ok(())
+    }
+
+    fn define_form(
+        &mut self,
+        key: Key,
+        id: FuncId,
+        compilation: &mut Compilation,
+        parts: &[u32],
+    ) -> Result<u32, JitError> {
         if let Some(failure) = self.failure.take() {
             return Err(failure);
         }
+        let passed = compilation.func.signature.params.len() + compilation.func.signature.returns.len();
         let done = self.module.define_function_with_control_plane(id, compilation, &mut ControlPlane::default());
         done.map_err(|error| JitError::Function { function: key.0, reason: format!("{error:?}") })?;
+        let mut stack_bytes = 0_u32;
         if let Some(compiled) = compilation.compiled_code() {
             self.bytes += compiled.code_buffer().len();
             // Above the frame lie the saved frame pointer, the return address and arguments that the caller pushed, which belong to the caller's frame.
             let frame = compiled.buffer.frame_layout().map_or(0, |layout| layout.frame_to_fp_offset);
-            self.stack_bytes.insert(key, frame.saturating_add(16));
+            let called = parts.iter().filter_map(|part| self.part_stack_bytes.get(*part as usize)).max();
+            stack_bytes = frame.saturating_add(16).saturating_add(called.copied().unwrap_or(0));
+            // What is pushed for it counts here: at most 16 bytes each.
+            stack_bytes = stack_bytes.saturating_add(u32::try_from(passed).unwrap_or(u32::MAX).saturating_mul(16));
         }
         self.module.clear_context(compilation);
-        Ok(())
+        Ok(stack_bytes)
+    }
+
+    fn declare_part(&mut self, number: u32, signature: &Signature) -> Result<FuncId, String> {
+        if let Some(id) = self.parts.get(&number) {
+            return Ok(*id);
+        }
+        let id = self.module.declare_anonymous_function(signature).map_err(|error| error.to_string())?;
+        self.parts.insert(number, id);
+        Ok(id)
     }
 
     fn failed(&self, key: Key, error: String) -> JitError {
@@ -324,6 +375,16 @@ impl Linker for Assembly {
             Ok(declared) => self.module.declare_func_in_func(declared, into),
             Err(error) => {
                 self.failure = Some(self.failed((id, program), error));
+                ir::FuncRef::from_u32(0)
+            }
+        }
+    }
+
+    fn part(&mut self, into: &mut ir::Function, number: u32, signature: &Signature) -> ir::FuncRef {
+        match self.declare_part(number, signature) {
+            Ok(declared) => self.module.declare_func_in_func(declared, into),
+            Err(error) => {
+                self.failure = Some(JitError::Host(error));
                 ir::FuncRef::from_u32(0)
             }
         }

@@ -15,6 +15,7 @@
 
 pub mod build;
 pub mod context;
+pub mod cut;
 pub mod lower;
 pub mod mir;
 pub mod passes;
@@ -47,11 +48,19 @@ pub struct JitOptions {
     pub passes: Passes,
     /// Whether it is noted which passes changed something ([`Jit::passes_fired`]): for tests, at the cost of a copy of each function for each pass.
     pub note_passes: bool,
+    /// From how many instructions of the mid-level form on a stretch of a longer function is [cut out](cut): [`cut::PART_ITEMS`], but for tests.
+    pub part_items: usize,
 }
 
 impl Default for JitOptions {
     fn default() -> Self {
-        JitOptions { fuel: false, verify_ir: cfg!(debug_assertions), passes: Passes::default(), note_passes: false }
+        JitOptions {
+            fuel: false,
+            verify_ir: cfg!(debug_assertions),
+            passes: Passes::default(),
+            note_passes: false,
+            part_items: cut::PART_ITEMS,
+        }
     }
 }
 

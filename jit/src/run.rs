@@ -70,10 +70,18 @@ pub(crate) fn compile(scope: &Scope<'_>, plan: &Plan, options: JitOptions) -> Re
     let mut improver = Improver::new(scope, options, plan.calls_virtual);
     for key in plan.functions.keys() {
         let mut function = build(scope, key.0, key.1);
-        improver.run(&mut function, key.1);
+        let parts = improver.run(&mut function, key.1);
         assembly.start_function();
-        lower(scope, &function, key.1, settings, &mut assembly, &mut compilation.func, &mut builder_context);
-        assembly.define(*key, &mut compilation)?;
+        for form in parts.iter().chain([&function]) {
+            assembly.start_form();
+            lower(scope, form, key.1, settings, &mut assembly, &mut compilation.func, &mut builder_context);
+            let called: Vec<u32> = form.parts().collect();
+            if std::ptr::eq(form, &raw const function) {
+                assembly.define(*key, &mut compilation, &called)?;
+            } else {
+                assembly.define_part(*key, &mut compilation, &called)?;
+            }
+        }
     }
     let needed_bytes = stack_bytes(scope, plan, assembly.stack_bytes());
     if needed_bytes > MAX_STACK_BYTES {
@@ -86,14 +94,9 @@ pub(crate) fn compile(scope: &Scope<'_>, plan: &Plan, options: JitOptions) -> Re
 /// What the deepest nesting of calls may take of a thread's stack: the longest chain of direct calls, or, where virtual calls may recurse, the
 /// largest frame as often as calls may nest.
 fn stack_bytes(scope: &Scope<'_>, plan: &Plan, frames: &BTreeMap<Key, u32>) -> u64 {
-    // What a call pushes: its arguments and results, at most 16 bytes each.
-    let of = |key: &Key| {
-        let function = &scope.verified.container().functions[key.0.index()];
-        let pushed = function.parameter_types().len() + function.results.len() + 8;
-        u64::from(frames.get(key).copied().unwrap_or(0)) + 16 * pushed as u64
-    };
+    let of = |key: &Key| u64::from(frames.get(key).copied().unwrap_or(0));
     if plan.calls_virtual {
-        let largest = plan.functions.keys().map(of).max().unwrap_or(0);
+        let largest = plan.functions.keys().map(&of).max().unwrap_or(0);
         return largest * u64::from(scope.verified.container().parameters.max_call_depth);
     }
     // Direct calls form no cycle: a callee's chain is shorter, so ascending order has it ready.

@@ -38,28 +38,48 @@ fn key_of(plan: &Plan, function: FunctionId) -> Key {
 #[must_use]
 pub fn mir_text(verified: &Verified, layout: &ImageLayout, options: JitOptions, function: FunctionId) -> String {
     let scope = plan::scope(verified, layout);
-    let Some(form) = form_of(&scope, &Plan::new(&scope), options, function) else { return String::new() };
+    let Some((_, forms)) = forms_of(&scope, &Plan::new(&scope), options, function) else { return String::new() };
     let debug = verified.container().debug.as_ref();
-    form.1.text(&|place| {
-        let data = form.1.places[place.index()];
-        source_line(debug, data.function, data.offset)
-    })
+    let text = |form: &mir::Function| {
+        form.text(&|place| {
+            let data = form.places[place.index()];
+            source_line(debug, data.function, data.offset)
+        })
+    };
+    titled(forms.iter().map(text))
 }
 
-fn form_of(
+/// Listings of a function's parts and of what is left of it.
+fn titled(listings: impl ExactSizeIterator<Item = String>) -> String {
+    let last = listings.len().saturating_sub(1);
+    let mut out = String::new();
+    for (number, listing) in listings.enumerate() {
+        if number < last {
+            let _ = writeln!(out, "; part {number}");
+        } else if last > 0 {
+            let _ = writeln!(out, "; what calls the parts");
+        }
+        out.push_str(&listing);
+    }
+    out
+}
+
+/// A function as it is compiled: its parts, then what is left of it.
+fn forms_of(
     scope: &crate::build::Scope<'_>,
     plan: &Plan,
     options: JitOptions,
     function: FunctionId,
-) -> Option<(Key, mir::Function)> {
+) -> Option<(Key, Vec<mir::Function>)> {
     let key = key_of(plan, function);
     let owner = scope.verified.container().functions.get(function.index())?.owner;
     if matches!(owner, khz_bytecode::container::Owner::Program(_)) && key.1 == ProgramMemory::None {
         return None;
     }
     let mut form = build(scope, key.0, key.1);
-    Improver::new(scope, options, plan.calls_virtual).run(&mut form, key.1);
-    Some((key, form))
+    let mut forms = Improver::new(scope, options, plan.calls_virtual).run(&mut form, key.1);
+    forms.push(form);
+    Some((key, forms))
 }
 
 /// A function as CLIF, as it is handed to Cranelift.
@@ -72,8 +92,7 @@ pub fn clif_text(
     options: JitOptions,
     function: FunctionId,
 ) -> Result<String, JitError> {
-    let compiled = Compiled::new(verified, layout, options, function, false)?;
-    Ok(compiled.map(|compiled| compiled.clif).unwrap_or_default())
+    compiled(verified, layout, options, function, false)
 }
 
 /// A function as machine code: Cranelift's listing, then which bytes come from which source line.
@@ -86,54 +105,62 @@ pub fn asm_text(
     options: JitOptions,
     function: FunctionId,
 ) -> Result<String, JitError> {
-    let compiled = Compiled::new(verified, layout, options, function, true)?;
-    Ok(compiled.map(|compiled| compiled.assembly).unwrap_or_default())
+    compiled(verified, layout, options, function, true)
 }
 
-struct Compiled {
-    clif: String,
-    assembly: String,
-}
-
-impl Compiled {
-    fn new(
-        verified: &Verified,
-        layout: &ImageLayout,
-        options: JitOptions,
-        function: FunctionId,
-        compile: bool,
-    ) -> Result<Option<Compiled>, JitError> {
-        let scope = plan::scope(verified, layout);
-        let plan = Plan::new(&scope);
-        let isa = host_isa(options.verify_ir)?;
-        let settings = Settings { source_lines: true, ..settings_for(&isa, &plan, options) };
-        let mut module = assembly(&scope, &plan, isa.clone())?;
-        let mut compilation = module.compilation();
-        let Some((key, form)) = form_of(&scope, &plan, options, function) else { return Ok(None) };
-        let mut builder_context = FunctionBuilderContext::new();
-        lower(&scope, &form, key.1, settings, &mut module, &mut compilation.func, &mut builder_context);
-        let debug = verified.container().debug.as_ref();
+/// CLIF of a function and its parts, or their machine code.
+fn compiled(
+    verified: &Verified,
+    layout: &ImageLayout,
+    options: JitOptions,
+    function: FunctionId,
+    machine_code: bool,
+) -> Result<String, JitError> {
+    let scope = plan::scope(verified, layout);
+    let plan = Plan::new(&scope);
+    let isa = host_isa(options.verify_ir)?;
+    let settings = Settings { source_lines: true, ..settings_for(&isa, &plan, options) };
+    let mut module = assembly(&scope, &plan, isa.clone())?;
+    let mut compilation = module.compilation();
+    let Some((key, forms)) = forms_of(&scope, &plan, options, function) else { return Ok(String::new()) };
+    let mut builder_context = FunctionBuilderContext::new();
+    let debug = verified.container().debug.as_ref();
+    let mut listings = Vec::new();
+    for form in &forms {
+        module.start_form();
+        lower(&scope, form, key.1, settings, &mut module, &mut compilation.func, &mut builder_context);
         let line = |location: SourceLoc| {
             let place = Some(location).filter(|location| !location.is_default())?.bits();
             let data = form.places.get(place as usize)?;
             source_line(debug, data.function, data.offset)
         };
-        let clif = with_lines(&compilation.func.display().to_string(), &line);
-        let mut assembly = String::new();
-        if compile {
-            compilation.set_disasm(true);
-            let done = compilation.compile(&*isa, &mut cranelift_codegen::control::ControlPlane::default());
-            let code = done.map_err(|error| JitError::Function { function, reason: format!("{:?}", error.inner) })?;
-            assembly.push_str(code.vcode.as_deref().unwrap_or_default());
-            let _ = writeln!(assembly, "; {} bytes", code.code_buffer().len());
-            for range in code.buffer.get_srclocs_sorted() {
-                if let Some(line) = line(range.loc) {
-                    let _ = writeln!(assembly, "; {:#06x}..{:#06x} {line}", range.start, range.end);
-                }
-            }
-        }
-        Ok(Some(Compiled { clif, assembly }))
+        listings.push(if machine_code {
+            machine_listing(&mut compilation, &*isa, function, &line)?
+        } else {
+            with_lines(&compilation.func.display().to_string(), &line)
+        });
+        compilation.clear();
     }
+    Ok(titled(listings.into_iter()))
+}
+
+fn machine_listing(
+    compilation: &mut cranelift_codegen::Context,
+    isa: &dyn cranelift_codegen::isa::TargetIsa,
+    function: FunctionId,
+    line: &dyn Fn(SourceLoc) -> Option<String>,
+) -> Result<String, JitError> {
+    compilation.set_disasm(true);
+    let done = compilation.compile(isa, &mut cranelift_codegen::control::ControlPlane::default());
+    let code = done.map_err(|error| JitError::Function { function, reason: format!("{:?}", error.inner) })?;
+    let mut assembly = code.vcode.clone().unwrap_or_default();
+    let _ = writeln!(assembly, "; {} bytes", code.code_buffer().len());
+    for range in code.buffer.get_srclocs_sorted() {
+        if let Some(line) = line(range.loc) {
+            let _ = writeln!(assembly, "; {:#06x}..{:#06x} {line}", range.start, range.end);
+        }
+    }
+    Ok(assembly)
 }
 
 /// CLIF marks lines with `@` and the place in hexadecimal; each change of the source line gets a line of its own.

@@ -8,7 +8,7 @@ use khz_bytecode::instruction::{HelperOp, HelperOperand, MAX_CAPACITIES};
 use khz_bytecode::trap::TrapCode;
 use khz_bytecode::value::LocalType;
 
-use super::{Lowerer, clif_value_type};
+use super::{Lowerer, clif_type, clif_value_type, signature_with};
 use crate::build::ProgramMemory;
 use crate::context;
 use crate::mir::{Instruction, Op, Value};
@@ -20,6 +20,7 @@ impl Lowerer<'_, '_> {
         match &instruction.op {
             Op::Call(function, arguments) => self.direct(instruction, *function, arguments),
             Op::CallVirtual(method, arguments) => self.call_virtual(instruction, *method, arguments),
+            Op::Part(number, arguments) => self.part(instruction, *number, arguments),
             Op::Helper(op, capacities, arguments) => self.helper(instruction, *op, *capacities, arguments),
             _ => {}
         }
@@ -55,6 +56,27 @@ impl Lowerer<'_, '_> {
         let target = self.linker.function(self.builder.func, function, program);
         let call = self.builder.ins().call(target, &values);
         self.finish(instruction, call, depth);
+    }
+
+    /// A part works on this call's frame and is none itself: it counts no depth, and what it trapped on is recorded already.
+    fn part(&mut self, instruction: &Instruction, number: u32, arguments: &[Value]) {
+        let program = self.function.program.into_iter().flat_map(|(slots, block)| [slots, block]);
+        let taken: Vec<Value> =
+            std::iter::once(self.function.frame).chain(program).chain(arguments.iter().copied()).collect();
+        let types =
+            |values: &[Value]| values.iter().map(|value| clif_type(self.function.ty(*value))).collect::<Vec<_>>();
+        let signature =
+            signature_with(&types(&taken), &types(instruction.results.as_slice()), self.settings.convention);
+        let mut values = vec![self.image, self.context];
+        values.extend(taken.iter().map(|value| self.value(*value)));
+        let target = self.linker.part(self.builder.func, number, &signature);
+        let call = self.builder.ins().call(target, &values);
+        let results = self.builder.inst_results(call).to_vec();
+        let Some((status, results)) = results.split_first() else { return };
+        self.leave_if_part_trapped(*status);
+        for (value, clif) in instruction.results.as_slice().iter().zip(results) {
+            self.values[value.index()] = Some(*clif);
+        }
     }
 
     fn call_virtual(&mut self, instruction: &Instruction, method: MethodId, arguments: &[Value]) {

@@ -166,6 +166,19 @@ impl Lowerer<'_, '_> {
         self.builder.switch_to_block(next);
     }
 
+    /// Leaves when a part of this function came back with a trap.
+    pub(super) fn leave_if_part_trapped(&mut self, status: ir::Value) {
+        let position = self.write_back.index();
+        let exit = *self.part_exits[position].get_or_insert_with(|| {
+            let exit = self.builder.create_block();
+            self.builder.set_cold_block(exit);
+            exit
+        });
+        let next = self.builder.create_block();
+        self.builder.ins().brif(status, exit, &[], next, &[]);
+        self.builder.switch_to_block(next);
+    }
+
     /// The block that records a trap and leaves, for the write-back at hand.
     fn trap_exit(&mut self) -> ir::Block {
         let position = self.write_back.index();
@@ -192,6 +205,10 @@ impl Lowerer<'_, '_> {
             if let Some(exit) = self.call_exits[position] {
                 self.builder.switch_to_block(exit);
                 self.record_caller(exit);
+                self.leave(position);
+            }
+            if let Some(exit) = self.part_exits[position] {
+                self.builder.switch_to_block(exit);
                 self.leave(position);
             }
         }

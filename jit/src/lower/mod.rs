@@ -28,6 +28,9 @@ pub trait Linker {
     /// A function of the module, as it is compiled for a program's memory.
     fn function(&mut self, into: &mut ir::Function, id: FunctionId, program: ProgramMemory) -> ir::FuncRef;
 
+    /// A part that was cut out of the function at hand.
+    fn part(&mut self, into: &mut ir::Function, number: u32, signature: &Signature) -> ir::FuncRef;
+
     /// A routine of the host. The signature must be the same at every use.
     fn routine(&mut self, into: &mut ir::Function, name: &'static str, signature: &Signature) -> ir::FuncRef;
 
@@ -85,6 +88,21 @@ pub fn signature(scope: &Scope<'_>, id: FunctionId, program: ProgramMemory, conv
     signature
 }
 
+/// Signature of a form, be it a whole function or a part of one.
+fn signature_of(function: &mir::Function, convention: CallConv) -> Signature {
+    let types = |values: &[mir::Value]| values.iter().map(|value| clif_type(function.ty(*value))).collect::<Vec<_>>();
+    let results: Vec<ir::Type> = function.results.iter().map(|ty| clif_type(*ty)).collect();
+    signature_with(&types(&function.blocks[0].parameters), &results, convention)
+}
+
+/// Signature of what takes these beside image and context, and gives these beside the status.
+fn signature_with(parameters: &[ir::Type], results: &[ir::Type], convention: CallConv) -> Signature {
+    let mut signature = Signature::new(convention);
+    signature.params.extend([types::I64; 2].iter().chain(parameters).map(|ty| AbiParam::new(*ty)));
+    signature.returns.extend([types::I32].iter().chain(results).map(|ty| AbiParam::new(*ty)));
+    signature
+}
+
 /// Alias regions of a function.
 #[derive(Debug, Clone, Copy)]
 struct Regions {
@@ -107,6 +125,7 @@ pub(crate) struct Lowerer<'a, 'b> {
     blocks: Vec<ir::Block>,
     trap_exits: Vec<Option<ir::Block>>,
     call_exits: Vec<Option<ir::Block>>,
+    part_exits: Vec<Option<ir::Block>>,
     regions: Regions,
     image: ir::Value,
     context: ir::Value,
@@ -125,7 +144,7 @@ pub fn lower(
     into: &mut ir::Function,
     builder_context: &mut FunctionBuilderContext,
 ) {
-    into.signature = signature(scope, function.id, program, settings.convention);
+    into.signature = signature_of(function, settings.convention);
     let region = |into: &mut ir::Function, user_id, description: &'static str| {
         into.dfg.alias_regions.insert(AliasRegionData { user_id, description: description.into() })
     };
@@ -151,6 +170,7 @@ pub fn lower(
         blocks,
         trap_exits: vec![None; function.write_backs.len()],
         call_exits: vec![None; function.write_backs.len()],
+        part_exits: vec![None; function.write_backs.len()],
         regions,
         image: parameters[0],
         context: parameters[1],
@@ -284,7 +304,7 @@ impl Lowerer<'_, '_> {
                 let clif = self.for_continues(test);
                 self.define(results, clif);
             }
-            Op::Call(..) | Op::CallVirtual(..) | Op::Helper(..) => self.call(instruction),
+            Op::Call(..) | Op::CallVirtual(..) | Op::Part(..) | Op::Helper(..) => self.call(instruction),
             Op::CheckIndex { .. }
             | Op::CheckRange { .. }
             | Op::CheckDivisor(_)

@@ -294,6 +294,8 @@ pub enum Op {
     Call(FunctionId, Vec<Value>),
     /// A call through the instance map: the address as an i64, then the arguments.
     CallVirtual(MethodId, Vec<Value>),
+    /// Runs a part that [was cut out](crate::cut) of this function, on the same frame: the values that it takes.
+    Part(u32, Vec<Value>),
     /// Deadline, then fuel: at a function's entry and at a loop's header.
     Checkpoint {
         /// Units charged where fuel is accounted for.
@@ -397,6 +399,19 @@ impl Terminator {
             Terminator::Branch { then, otherwise, .. } => vec![then, otherwise],
             Terminator::Switch { targets, default, .. } => targets.iter().chain([default]).collect(),
             Terminator::Return(_) => Vec::new(),
+        }
+    }
+
+    /// Calls `f` with every value that it reads.
+    pub fn for_each_operand(&mut self, mut f: impl FnMut(&mut Value)) {
+        match self {
+            Terminator::Branch { condition, .. } => f(condition),
+            Terminator::Switch { value, .. } => f(value),
+            Terminator::Return(values) => values.iter_mut().for_each(&mut f),
+            Terminator::Jump(_) => {}
+        }
+        for target in self.targets_mut() {
+            target.arguments.iter_mut().for_each(&mut f);
         }
     }
 
@@ -549,6 +564,15 @@ impl Function {
         reached
     }
 
+    /// The parts that it calls.
+    pub fn parts(&self) -> impl Iterator<Item = u32> {
+        let instructions = self.blocks.iter().flat_map(|block| &block.instructions);
+        instructions.filter_map(|instruction| match instruction.op {
+            Op::Part(number, _) => Some(number),
+            _ => None,
+        })
+    }
+
     /// Whether `inner` is `outer` or lies in it.
     #[must_use]
     pub fn loop_contains(&self, outer: LoopId, inner: Option<LoopId>) -> bool {
@@ -601,7 +625,7 @@ impl Op {
                 address(destination, &mut f);
                 address(source, &mut f);
             }
-            Op::Helper(_, _, values) | Op::Call(_, values) | Op::CallVirtual(_, values) => {
+            Op::Helper(_, _, values) | Op::Call(_, values) | Op::CallVirtual(_, values) | Op::Part(_, values) => {
                 values.iter_mut().for_each(f);
             }
         }

@@ -140,6 +140,11 @@ impl Display for Op {
                 list(f, values)?;
                 f.write_char(')')
             }
+            Op::Part(number, values) => {
+                write!(f, "part {number}(")?;
+                list(f, values)?;
+                f.write_char(')')
+            }
             Op::Checkpoint { fuel, deadline } => {
                 write!(f, "checkpoint fuel {fuel}{}", if *deadline { "" } else { " no deadline" })
             }

@@ -33,7 +33,10 @@ fn work_of(function: &Function) -> Vec<Option<u64>> {
     for block in &function.blocks {
         let Some(id) = block.innermost_loop else { continue };
         let calls = |op: &Op| {
-            matches!(op, Op::Call(..) | Op::CallVirtual(..) | Op::Helper(..) | Op::Copy { .. } | Op::Zero(..))
+            matches!(
+                op,
+                Op::Call(..) | Op::CallVirtual(..) | Op::Part(..) | Op::Helper(..) | Op::Copy { .. } | Op::Zero(..)
+            )
         };
         let known = !block.instructions.iter().any(|instruction| calls(&instruction.op));
         let own = block.instructions.len() as u64 + 1;

@@ -306,14 +306,9 @@ impl Copy {
     }
 
     fn terminator(&self, terminator: &mut Terminator) {
-        match terminator {
-            Terminator::Branch { condition, .. } => *condition = self.value(*condition),
-            Terminator::Switch { value, .. } => *value = self.value(*value),
-            Terminator::Jump(_) | Terminator::Return(_) => {}
-        }
+        terminator.for_each_operand(|value| *value = self.value(*value));
         for target in terminator.targets_mut() {
             target.block.0 += self.first_block;
-            target.arguments.iter_mut().for_each(|value| *value = self.value(*value));
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Improvements of the mid-level form: one file each, each a function of a [`Function`](crate::mir::Function) and what it calls.
 //!
-//! [`Improver::run`] gives the order, [`Passes`] switches them one by one, for measuring and for finding a fault. Each is linear in the size of the function.
+//! [`Improver`] gives the order, [`Passes`] switches them one by one, for measuring and for finding a fault. Each is linear in the size of the
+//! function; long functions are [cut](crate::cut) into parts between inlining and the rest.
 
 pub mod bools;
 pub mod checks;
@@ -15,9 +16,9 @@ pub mod repeats;
 pub mod threads;
 pub mod vectorise;
 
-use crate::JitOptions;
 use crate::build::{ProgramMemory, Scope};
 use crate::mir::Function;
+use crate::{JitOptions, cut};
 
 macro_rules! passes {
     ($($(#[$doc:meta])* $name:ident;)*) => {
@@ -87,8 +88,7 @@ pub struct Improver<'a> {
     scope: &'a Scope<'a>,
     /// `None` where nothing is inlined.
     inliner: Option<inline::Inliner<'a>>,
-    passes: Passes,
-    fuel: bool,
+    options: JitOptions,
     /// Passes that have changed a function so far, where that is noted.
     fired: Option<Passes>,
 }
@@ -97,9 +97,8 @@ impl<'a> Improver<'a> {
     /// Passes over the functions of a container. `calls_virtual`: whether calls count their depth, so that none may vanish.
     #[must_use]
     pub fn new(scope: &'a Scope<'a>, options: JitOptions, calls_virtual: bool) -> Self {
-        let JitOptions { passes, fuel, note_passes, .. } = options;
-        let inliner = (passes.inline && !calls_virtual).then(|| inline::Inliner::new(scope));
-        Improver { scope, inliner, passes, fuel, fired: note_passes.then_some(Passes::NONE) }
+        let inliner = (options.passes.inline && !calls_virtual).then(|| inline::Inliner::new(scope));
+        Improver { scope, inliner, options, fired: options.note_passes.then_some(Passes::NONE) }
     }
 
     /// Passes that have changed a function so far; `None` when that is not noted.
@@ -108,35 +107,66 @@ impl<'a> Improver<'a> {
         self.fired
     }
 
-    /// Runs the passes on a function as it was built.
-    pub fn run(&mut self, function: &mut Function, program: ProgramMemory) {
-        let Improver { scope, inliner, passes, fuel, fired } = self;
-        let effects = promote::CallEffects::new(scope.verified);
+    /// Runs the passes on a function as it was built; gives the parts that it was cut into, callees before callers.
+    pub fn run(&mut self, function: &mut Function, program: ProgramMemory) -> Vec<Function> {
+        self.noting(
+            function,
+            |fired| &mut fired.inline,
+            |improver, function| {
+                if let Some(inliner) = &mut improver.inliner {
+                    inliner.run(function, program);
+                }
+            },
+        );
+        let mut parts = cut::run(function, self.options.part_items);
+        for number in 0..parts.len() {
+            let (before, rest) = parts.split_at_mut(number);
+            if let Some(part) = rest.first_mut() {
+                self.improve(part, before);
+            }
+        }
+        self.improve(function, &parts);
+        parts
+    }
+
+    /// Runs what works on one function, which calls parts.
+    fn improve(&mut self, function: &mut Function, parts: &[Function]) {
+        let JitOptions { passes, fuel, .. } = self.options;
+        let effects = promote::CallEffects::new(self.scope.verified, parts);
         macro_rules! steps {
             ($($name:ident $(if $also:expr)? => $run:expr;)*) => { $(
                 if passes.$name $(&& $also)? {
-                    // Names that a pass made up and dropped again are no change.
-                    let before = fired.is_some().then(|| (function.blocks.clone(), function.loops.clone()));
-                    $run;
-                    if let (Some(fired), Some((blocks, loops))) = (fired.as_mut(), before) {
-                        fired.$name |= blocks != function.blocks || loops != function.loops;
-                    }
+                    self.noting(function, |fired| &mut fired.$name, |_, function| ($run)(function));
                 }
             )* };
         }
         steps! {
-            inline => if let Some(inliner) = inliner { inliner.run(function, program) };
-            promote => promote::run(function, effects);
-            fold => fold::run(function);
-            checks => checks::run(function);
-            deadlines => deadlines::run(function);
-            vectorise if !*fuel => vectorise::run(function);
-            for_loops => for_loops::run(function);
-            fold => fold::run(function);
-            if_convert => if_convert::run(function);
-            threads => threads::run(function);
-            repeats => repeats::run(function);
-            bools => bools::run(function);
+            promote => |function: &mut Function| promote::run(function, effects);
+            fold => fold::run;
+            checks => checks::run;
+            deadlines => deadlines::run;
+            vectorise if !fuel => vectorise::run;
+            for_loops => for_loops::run;
+            fold => fold::run;
+            if_convert => if_convert::run;
+            threads => threads::run;
+            repeats => repeats::run;
+            bools => bools::run;
+        }
+    }
+
+    /// Runs a pass and notes whether it changed the function.
+    fn noting(
+        &mut self,
+        function: &mut Function,
+        row: fn(&mut Passes) -> &mut bool,
+        pass: impl FnOnce(&mut Self, &mut Function),
+    ) {
+        // Names that a pass made up and dropped again are no change.
+        let before = self.fired.map(|_| (function.blocks.clone(), function.loops.clone()));
+        pass(self, function);
+        if let (Some(fired), Some((blocks, loops))) = (&mut self.fired, before) {
+            *row(fired) |= blocks != function.blocks || loops != function.loops;
         }
     }
 }

@@ -26,13 +26,14 @@ const MOST_STORES: usize = 4096;
 #[derive(Debug, Clone, Copy)]
 pub struct CallEffects<'a> {
     verified: &'a Verified,
+    parts: &'a [Function],
 }
 
 impl<'a> CallEffects<'a> {
-    /// The verifier's effect summaries.
+    /// The verifier's effect summaries, and the parts that were cut out of the function.
     #[must_use]
-    pub fn new(verified: &'a Verified) -> Self {
-        CallEffects { verified }
+    pub fn new(verified: &'a Verified, parts: &'a [Function]) -> Self {
+        CallEffects { verified, parts }
     }
 
     fn add(&self, op: &Op, touched: &mut Touched) {
@@ -47,6 +48,17 @@ impl<'a> CallEffects<'a> {
             }
             // A method has no way to the slots of a program, but to those of all.
             Op::CallVirtual(..) => touched.all_globals = true,
+            Op::Part(number, _) if touched.parts.insert(*number) => {
+                let part = self.parts.get(*number as usize);
+                for instruction in part.iter().flat_map(|part| &part.blocks).flat_map(|block| &block.instructions) {
+                    match &instruction.op {
+                        Op::LoadSlot(slot, _) | Op::StoreSlot(slot, ..) => {
+                            touched.slots.insert(*slot);
+                        }
+                        op => self.add(op, touched),
+                    }
+                }
+            }
             _ => {}
         }
     }
@@ -55,6 +67,7 @@ impl<'a> CallEffects<'a> {
 #[derive(Default)]
 struct Touched {
     callees: BTreeSet<FunctionId>,
+    parts: BTreeSet<u32>,
     slots: BTreeSet<Slot>,
     all_globals: bool,
 }
@@ -79,6 +92,7 @@ pub fn run(function: &mut Function, effects: CallEffects<'_>) {
     }
     let headers = function.loops.iter().enumerate().map(|(number, data)| (data.header, LoopId(number as u32)));
     let headers: BTreeMap<Block, LoopId> = headers.collect();
+    let mut known = BTreeMap::new();
     for level in 0..DEEPEST_LEVEL {
         let at_level: Vec<(LoopId, Vec<usize>)> = loops_of_level(function, level);
         if at_level.is_empty() {
@@ -86,7 +100,7 @@ pub fn run(function: &mut Function, effects: CallEffects<'_>) {
         }
         let mut ways_in = WaysIn::new(function, &headers);
         for (id, blocks) in at_level {
-            promote(function, id, &blocks, effects, &headers, &mut ways_in);
+            promote(function, id, &blocks, effects, &headers, &mut ways_in, &mut known);
         }
     }
 }
@@ -141,6 +155,7 @@ fn promote(
     effects: CallEffects<'_>,
     headers: &BTreeMap<Block, LoopId>,
     ways_in: &mut WaysIn,
+    known: &mut BTreeMap<Slot, Var>,
 ) {
     let inside: BTreeSet<usize> = blocks.iter().copied().collect();
     let chosen = choose(function, blocks, effects);
@@ -152,7 +167,9 @@ fn promote(
     let held: BTreeMap<Slot, (Var, Access)> = chosen
         .iter()
         .map(|(slot, usage)| {
-            let var = function.new_variable(usage.access.storage.value_type().into());
+            // A slot has one variable for all loops that hold it: making SSA form takes time and memory for each variable in each block.
+            let ty = usage.access.storage.value_type().into();
+            let var = *known.entry(*slot).or_insert_with(|| function.new_variable(ty));
             (*slot, (var, usage.access))
         })
         .collect();
