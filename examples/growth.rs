@@ -156,7 +156,8 @@ fn measure(text: &str, units: usize) -> Row {
     let bytes = container::write(&compilation.resources[0].container).expect("it fits");
     let (read, load_ms) = timed(|| container::read(&bytes).expect("it reads"));
     let (verified, verify_ms) = timed(|| verify(read).expect("it verifies"));
-    let program = Program { name: "growth".into(), verified: Arc::new(verified), container_bytes: bytes.len() };
+    let (name, container_bytes) = ("growth".into(), bytes.len());
+    let program = Program { name, verified: Arc::new(verified), container_bytes, inputs: Vec::new() };
     let layout = program.layout(MAX_IMAGE_BYTES).expect("it fits");
     let (mut interp, interp_ms) = timed(|| program.engine(EngineKind::Interp, &layout, false).expect("it compiles"));
     let (mut jit, jit_ms) = timed(|| program.engine(EngineKind::Jit, &layout, false).expect("it compiles"));
