@@ -21,9 +21,9 @@ fn random_programs_in_small_parts_do_the_same() {
     };
     let (four, plain, twenty) = (cut(4, Passes::ALL), cut(7, Passes::NONE), cut(20, Passes::ALL));
     let makers = [
-        Maker { name: "jit in parts of 4", make: &four },
-        Maker { name: "jit in parts of 7 without passes", make: &plain },
-        Maker { name: "jit in parts of 20", make: &twenty },
+        Maker::new("jit in parts of 4", &four),
+        Maker::new("jit in parts of 7 without passes", &plain),
+        Maker::new("jit in parts of 20", &twenty),
     ];
     for seed in 40_000..40_150 {
         let verified = Arc::new(generate(seed));
