@@ -100,6 +100,9 @@ fn cut(value: &str) -> String {
 
 impl Display for Traces {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.rows.is_empty() {
+            return Ok(());
+        }
         let widest = |heading: &str, cells: &mut dyn Iterator<Item = &String>| {
             cells.map(|cell| cut(cell).chars().count()).chain([heading.chars().count()]).max().unwrap_or(0)
         };

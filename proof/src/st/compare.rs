@@ -64,9 +64,9 @@ pub enum Sort {
 /// A statement of the program.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Statement {
-    /// Where it begins.
+    /// The place in it where it happened.
     pub place: SourcePosition,
-    /// Its line of the source, from there.
+    /// Its line of the source.
     pub text: String,
 }
 
@@ -75,8 +75,8 @@ impl Statement {
     #[must_use]
     pub fn at(place: SourcePosition, source: &str) -> Statement {
         let line = source.lines().nth((place.line as usize).saturating_sub(1)).unwrap_or("");
-        let text = line.chars().skip((place.column as usize).saturating_sub(1)).collect::<String>();
-        Statement { place, text: text.trim_end().to_string() }
+        let text = line.trim().to_string();
+        Statement { place, text }
     }
 }
 
@@ -252,9 +252,13 @@ impl Bench<'_> {
             let Some((left, others)) = sides.split_first() else { return Ran::Equal };
             if let Some(right) = others.iter().find(|right| differ(left, right)) {
                 let mut difference = tell(left, right, &names, verified.container());
-                let place = difference.trapped.or_else(|| self.writer(verified, layout, rounds, &difference));
-                let source = place.and_then(|place| describe(place, verified.container()).source);
-                difference.statement = source.map(|place| Statement::at(place, text));
+                let places = match difference.trapped {
+                    Some(place) => vec![place],
+                    None => self.writer(verified, layout, rounds, &difference).unwrap_or_default(),
+                };
+                // Inside a standard block nothing has a place in the source; its call has one.
+                let mut sources = places.into_iter().filter_map(|place| describe(place, verified.container()).source);
+                difference.statement = sources.find(|place| place.file == FILE).map(|place| Statement::at(place, text));
                 return Ran::Different(Box::new(difference));
             }
             match left.rounds.last() {
@@ -266,14 +270,14 @@ impl Bench<'_> {
         Ran::Equal
     }
 
-    /// The instruction that wrote the differing variable last, as the third evaluator runs the same rounds.
+    /// The instruction that wrote the differing variable last, as the third evaluator runs the same rounds, and the calls that led there.
     fn writer(
         &self,
         verified: &Arc<Verified>,
         layout: &ImageLayout,
         rounds: &[Round],
         difference: &Difference,
-    ) -> Option<CodePlace> {
+    ) -> Option<Vec<CodePlace>> {
         let names = VariableTable::of(verified.container());
         let variable = names.resolve(difference.variable.as_deref()?).ok()?;
         let bytes = names.bytes_of(layout, &variable)?;
@@ -287,7 +291,7 @@ impl Bench<'_> {
             give(&mut image, &names, verified.container(), round, now);
             run_round(&mut evaluator, &mut image, verified, number == 0, Some(self.fuel)).ok()?;
         }
-        evaluator.writer(0).first().copied()
+        Some(evaluator.writer(0).to_vec())
     }
 }
 
@@ -362,7 +366,10 @@ fn tell(left: &Side<'_>, right: &Side<'_>, names: &VariableTable, container: &Co
     let (sort, description) = match (&trap, &first) {
         (Some(((_, a), (_, b))), _) => (Sort::Trap, format!("{}; {}", ending(a, container), ending(b, container))),
         (None, Some(row)) => (Sort::Value, format!("{} = {}; {}", row.name, row.left, row.right)),
-        (None, None) => (Sort::Image, "the memory images differ where no variable lies".to_string()),
+        (None, None) => {
+            let at = left.image.first_difference(&right.image).unwrap_or(0);
+            (Sort::Image, format!("the memory images differ at byte {at}, where no variable lies"))
+        }
     };
     let trapped = trap.and_then(|((_, a), (_, b))| a.err().or(b.err())).map(|trap| trap.place);
     Difference {

@@ -419,7 +419,16 @@ impl Editor {
             | ExprKind::Trunc(inner) => {
                 self.expr(inner);
             }
-            ExprKind::Std(_, inputs) => inputs.iter_mut().for_each(|input| self.expr(input)),
+            ExprKind::Std(_, inputs) => {
+                // Of functions that take as many as one likes; others are refused then.
+                for at in 2..inputs.len() {
+                    if self.here() {
+                        inputs.remove(at);
+                        return;
+                    }
+                }
+                inputs.iter_mut().for_each(|input| self.expr(input));
+            }
             ExprKind::Call(_, args) => self.args(args),
         }
     }
