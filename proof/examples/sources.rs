@@ -1,22 +1,23 @@
-//! Spoils Structured Text and checks it as `khz check` does, every diagnostic rendered: `sources FIRST_SEED COUNT [FOLDER]…`, from the repository's programs,
+//! Spoils Structured Text and checks it as `khz check` does, every diagnostic rendered: `sources FIRST_SEED COUNT [--threads N] [FOLDER]…`, from the repository's programs,
 //! generated ones, and those of further folders. A count of 1 writes the text to `source.st`.
 //!
 //! A panic, more than a second or more than 256 MiB for one source is a finding; its text is written to `source-SEED.st`.
-#![allow(clippy::print_stdout, clippy::print_stderr, reason = "a program for people")]
+#![allow(clippy::print_stdout, reason = "a program for people")]
 
 #[path = "../tests/common/bases.rs"]
 mod bases;
 #[path = "../tests/common/checked.rs"]
 mod checked;
+mod common;
 #[path = "../tests/common/measure.rs"]
 mod measure;
 
 use std::path::PathBuf;
-use std::time::Instant;
 
 use checked::Checked;
+use common::Arguments;
 use khz_frontend::on_large_stack;
-use khz_proof::campaign::{Campaign, Figures, Finding, Report};
+use khz_proof::campaign::{Figures, Finding};
 use khz_proof::mutate::source::mutant;
 
 /// Generated programs among the texts.
@@ -39,46 +40,33 @@ impl Figures for Seen {
     }
 }
 
-#[allow(clippy::disallowed_methods, reason = "wall time, for people")]
 fn main() {
-    let words: Vec<String> = std::env::args().skip(1).collect();
-    let number = |at: usize, other: u64| words.get(at).and_then(|word| word.parse().ok()).unwrap_or(other);
-    let (first, count) = (number(0, 0), number(1, 10_000));
-    let folders: Vec<PathBuf> = words.iter().skip(2).map(PathBuf::from).collect();
+    let mut arguments = Arguments::read(10_000, &[]);
+    let (first, count) = (arguments.first, arguments.count);
+    let folders: Vec<PathBuf> = arguments.words.iter().map(PathBuf::from).collect();
     let texts = bases::texts(GENERATED, &folders);
     println!("{} texts, {} bytes in all", texts.len(), texts.iter().map(Vec::len).sum::<usize>());
-    let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    let start = Instant::now();
-    // A seed of the campaign is a batch of sources: so the front end's thread is made once for many, and their memory is counted where it is used.
-    let campaign = Campaign { first: 0, count: count.div_ceil(BATCH), threads, most_findings: 20 };
-    let report: Report<Seen> = campaign.run(
-        |batch, seen: &mut Seen| {
-            let seeds = first + batch * BATCH..first + ((batch + 1) * BATCH).min(count);
-            seen.merge(on_large_stack(|| look_at(&texts, seeds.clone())));
-            None
-        },
-        |progress| eprintln!("{} of {} batches", progress.done, progress.count),
-    );
+    // A seed of the search is a batch of sources: so the front end's thread is made once for many, and their memory is counted where it is used.
+    (arguments.first, arguments.count) = (0, count.div_ceil(BATCH));
+    let report = arguments.search(|batch, seen: &mut Seen| {
+        let seeds = first + batch * BATCH..first + ((batch + 1) * BATCH).min(count);
+        seen.merge(on_large_stack(|| look_at(&texts, seeds.clone())));
+        None
+    });
     let seen = report.figures;
     if count == 1 {
         // Who asks for one seed wants to see it.
         let written = std::fs::write("source.st", mutant(&texts, first).bytes);
         println!("source.st: {written:?}");
     }
-    for finding in seen.findings.iter().chain(&report.findings).take(50) {
+    for finding in &seen.findings {
         let path = format!("source-{}.st", finding.seed);
         let mutant = mutant(&texts, finding.seed);
         let written = std::fs::write(&path, &mutant.bytes);
         println!("==== seed {}, {:?}: {} ({path}: {written:?})", finding.seed, mutant.kinds, finding.description);
     }
     println!("{}{}", seen.checked.report(), seen.costs.report());
-    let seconds = start.elapsed().as_secs_f64();
-    println!(
-        "{} findings in {} sources, {seconds:.1} s, {:.0} a second",
-        seen.findings.len() + report.findings.len(),
-        seen.checked.total,
-        seen.checked.total as f64 / seconds
-    );
+    println!("{} findings in {} sources", seen.findings.len() + report.findings.len(), seen.checked.total);
 }
 
 fn look_at(texts: &[Vec<u8>], seeds: std::ops::Range<u64>) -> Seen {
