@@ -41,7 +41,7 @@ fn main() {
         for at in 0..tokens.len() {
             for slip in SLIPS {
                 number += 1;
-                if number % every != 0 {
+                if !number.is_multiple_of(every) {
                     continue;
                 }
                 let Some(changed) = mutant(&text, &tokens, at, slip) else { continue };

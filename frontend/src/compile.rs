@@ -8,6 +8,7 @@ use std::collections::BTreeSet;
 
 use crate::analysis;
 use crate::diagnostics::{Diagnostic, has_errors, tidy};
+use crate::lint;
 use crate::lower;
 use crate::source::{FileId, SourceMap, Span};
 use crate::syntax::ast::Ast;
@@ -167,6 +168,9 @@ fn run(inputs: &[SourceInput], options: &CompileOptions, only_checks: bool) -> C
                 Err(found) => diagnostics.push(*found),
             }
         }
+    }
+    if !has_errors(&diagnostics) {
+        diagnostics.extend(lint::lint(&ast, &project, standard));
     }
     if only_checks && desugar::has_tests(&ast) {
         let (units, found) = desugar::desugar(&mut ast);

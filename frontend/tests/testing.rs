@@ -129,7 +129,9 @@ fn words_of_tests_are_names_elsewhere() {
                 FUNCTION ASSERT_TRUE : BOOL VAR_INPUT x : INT; END_VAR ASSERT_TRUE := x > 1; END_FUNCTION\n\
                 FUNCTION_BLOCK TEST VAR_INPUT x : INT; END_VAR END_FUNCTION_BLOCK\n\
                 TEST 't'\nVAR ok : BOOL; setup, mock : INT; END_VAR\nok := ASSERT_TRUE(3); setup := 1; mock := setup;\nEND_TEST\n";
-    expect![""].assert_eq(&messages(text));
+    expect![[r#"
+        t.st:2:44 S0070 the variable `advance_time` is never used (leave it out)
+    "#]].assert_eq(&messages(text));
 }
 
 #[test]

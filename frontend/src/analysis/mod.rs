@@ -49,7 +49,8 @@ pub fn analyze(ast: &Ast, options: &CompileOptions, standard: Option<FileId>) ->
     let resources = analyzer.configure();
     let resources = analyzer.check_bodies(resources);
     let pous = analyzer.pous.into_iter().flatten().collect();
-    (Project { types: analyzer.types, pous, globals: analyzer.globals, resources }, analyzer.diagnostics)
+    let Analyzer { types, globals, unreached, diagnostics, .. } = analyzer;
+    (Project { types, pous, globals, resources, unreached }, diagnostics)
 }
 
 /// The same for the PROGRAMs that tests were made to: a resource for each, in their order, and what was found in it.
@@ -67,7 +68,8 @@ pub fn analyze_tests(
     let mut tests = analyzer.tests.take().unwrap_or_default();
     let findings = units.iter().map(|unit| tests.take(unit)).collect();
     let pous = analyzer.pous.into_iter().flatten().collect();
-    (Project { types: analyzer.types, pous, globals: analyzer.globals, resources }, findings, analyzer.diagnostics)
+    let Analyzer { types, globals, unreached, diagnostics, .. } = analyzer;
+    (Project { types, pous, globals, resources, unreached }, findings, diagnostics)
 }
 
 /// For how many unknown names a known one is looked for that may have been meant.
@@ -150,6 +152,8 @@ struct Analyzer<'a> {
     names_lost: bool,
     /// POUs whose own declarations may have been lost.
     lost_in: Vec<Span>,
+    /// Bodies of units that no resource reaches.
+    unreached: Vec<(PouId, tree::Body)>,
     /// Present when tests are compiled.
     tests: Option<testing::Tests>,
 }
@@ -197,6 +201,7 @@ impl<'a> Analyzer<'a> {
             suggestions: 0,
             names_lost: ast.files.iter().any(|file| file.names_lost),
             lost_in: ast.declarations().filter_map(lost_span).collect(),
+            unreached: Vec::new(),
             tests: None,
         }
     }

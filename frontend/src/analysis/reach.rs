@@ -57,9 +57,10 @@ impl<'a> Analyzer<'a> {
                 continue;
             }
             let (body, _) = self.check_body(pou, &everything);
-            for (callee, span) in body.callees {
-                calls.entry(pou).or_default().entry(callee).or_insert(span);
+            for (callee, span) in &body.callees {
+                calls.entry(pou).or_default().entry(*callee).or_insert(*span);
             }
+            self.unreached.push((pou, body));
         }
     }
 

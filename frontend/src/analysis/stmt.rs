@@ -7,10 +7,13 @@ use super::expr::Checker;
 use khz_bytecode::limits::MAX_LOOP_DEPTH;
 
 use super::tree::{CaseArm, Expr, ExprKind, ForStmt, Place, Step, Stmt, StmtKind};
-use super::types::{Const, DINT, Ty, TyKind, integer_type, is_bits, is_integer, limits};
+use super::types::{Const, DINT, Ty, TyKind, integer_type, is_bits, is_integer, limits, widen};
 use crate::diagnostics::{Diagnostic, semantic as names, types as rules};
 use crate::source::Span;
 use crate::syntax::ast::{self, Block, CaseLabel};
+
+/// How many missing values of an enumeration a message names.
+const MAX_SHOWN_VALUES: usize = 5;
 
 impl<'a> Checker<'_, 'a> {
     /// The statements of a block. What no way leads to is dropped, with a warning.
@@ -154,10 +157,32 @@ impl<'a> Checker<'_, 'a> {
             }
             list.push(CaseArm { ranges, body: self.block(&arm.body) });
         }
+        if otherwise.is_none() {
+            self.note_missing_values(found.ty, &all, selector.span);
+        }
         let otherwise = otherwise.map(|block| self.block(block)).unwrap_or_default();
         self.refuse_overlap(all);
         elementary?;
         Some(Stmt { kind: StmtKind::Case { selector: found, arms: list, otherwise }, span })
+    }
+
+    /// A CASE without ELSE on an enumeration does nothing for the values that no arm has.
+    fn note_missing_values(&mut self, ty: Ty, arms: &[(i128, i128, Span)], span: Span) {
+        let Some(TyKind::Enum { base, values, .. }) = self.an.types.kind(ty) else { return };
+        let number = |value: i64| widen(*base, value);
+        let has_arm = |value: i64| arms.iter().any(|(low, high, _)| (*low..=*high).contains(&number(value)));
+        let missing: Vec<&str> =
+            values.iter().filter(|value| !has_arm(value.2)).map(|value| value.1.as_str()).collect();
+        // One arm for one of many values is an IF in other words.
+        if missing.is_empty() || missing.len() * 2 > values.len() {
+            return;
+        }
+        let shown =
+            missing.iter().take(MAX_SHOWN_VALUES).map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
+        let more = missing.len().saturating_sub(MAX_SHOWN_VALUES);
+        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+        let found = Diagnostic::new(&names::MISSING_VALUES, span, format!("no arm for {shown}{more}"));
+        self.an.push(found.help("say with ELSE what happens then; `ELSE ;` if nothing does"));
     }
 
     fn refuse_overlap(&mut self, mut all: Vec<(i128, i128, Span)>) {

@@ -36,6 +36,8 @@ pub struct Project {
     pub globals: Vec<GlobalInfo>,
     /// One for each RESOURCE.
     pub resources: Vec<ResourcePlan>,
+    /// Checked bodies of units that no resource reaches, ascending: nothing is made of them.
+    pub unreached: Vec<(PouId, Body)>,
 }
 
 /// The declaration of a program organisation unit.

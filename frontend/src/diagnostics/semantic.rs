@@ -221,4 +221,44 @@ rules! {
         wrong "PROGRAM p\nEND_PROGRAM\nTEST 'pump'\nVAR\n  speed : INT;\nEND_VAR\n  MOCK speed;\nEND_TEST\n"
         right "FUNCTION_BLOCK Pump\nEND_FUNCTION_BLOCK\nPROGRAM p\nEND_PROGRAM\nTEST 'pump'\nVAR\n  pump1 : Pump;\nEND_VAR\n  MOCK pump1;\nEND_TEST\n"
     }
+    UNUSED_VARIABLE = "S0070" Warning "a variable that is never used" {
+        "Nothing reads or writes it. Variables at an address, and those of a PROGRAM that have an initial value, are left alone: others may use them from outside."
+        wrong "FUNCTION f : INT\nVAR\n  a : INT;\n  b : INT;\nEND_VAR\n  a := 1;\n  f := a;\nEND_FUNCTION\nPROGRAM p\nEND_PROGRAM\n"
+        right "FUNCTION f : INT\nVAR\n  a : INT;\nEND_VAR\n  a := 1;\n  f := a;\nEND_FUNCTION\nPROGRAM p\nEND_PROGRAM\n"
+    }
+    OUTPUT_NEVER_WRITTEN = "S0071" Warning "an output that is never written" {
+        "The body neither assigns the output (or the function's result) nor hands it on, so it keeps its initial value."
+        wrong "FUNCTION_BLOCK F\nVAR_INPUT\n  x : INT;\nEND_VAR\nVAR_OUTPUT\n  y : INT;\nEND_VAR\nVAR\n  z : INT;\nEND_VAR\n  z := x;\nEND_FUNCTION_BLOCK\nPROGRAM p\nEND_PROGRAM\n"
+        right "FUNCTION_BLOCK F\nVAR_INPUT\n  x : INT;\nEND_VAR\nVAR_OUTPUT\n  y : INT;\nEND_VAR\n  y := x;\nEND_FUNCTION_BLOCK\nPROGRAM p\nEND_PROGRAM\n"
+    }
+    SELF_ASSIGNMENT = "S0072" Warning "a variable is assigned to itself" {
+        "The assignment changes nothing; another variable is probably meant on one side."
+        wrong "PROGRAM p\nVAR\n  a : INT;\n  b : INT;\nEND_VAR\n  b := 1;\n  a := a;\nEND_PROGRAM\n"
+        right "PROGRAM p\nVAR\n  a : INT;\n  b : INT;\nEND_VAR\n  b := 1;\n  a := b;\nEND_PROGRAM\n"
+    }
+    EMPTY_BODY = "S0073" Warning "a statement around nothing" {
+        "There is no statement where the branch or loop should do something. A `;` says that nothing is meant to happen."
+        wrong "PROGRAM p\nVAR\n  a : INT;\nEND_VAR\n  IF a > 1 THEN\n  END_IF;\nEND_PROGRAM\n"
+        right "PROGRAM p\nVAR\n  a : INT;\nEND_VAR\n  IF a > 1 THEN\n    a := 0;\n  END_IF;\nEND_PROGRAM\n"
+    }
+    SHADOWED_GLOBAL = "S0074" Warning "a variable hides a global one" {
+        "Inside of this unit the name means the unit's own variable; the global of the same name can not be reached. VAR_EXTERNAL says that the global is meant."
+        wrong "VAR_GLOBAL\n  speed : INT;\nEND_VAR\nPROGRAM p\nVAR\n  speed : INT;\nEND_VAR\n  speed := 1;\nEND_PROGRAM\n"
+        right "VAR_GLOBAL\n  speed : INT;\nEND_VAR\nPROGRAM p\nVAR_EXTERNAL\n  speed : INT;\nEND_VAR\n  speed := 1;\nEND_PROGRAM\n"
+    }
+    LOOP_VARIABLE = "S0075" Warning "the loop's own variable is changed in its body" {
+        "How often the loop runs was fixed when it started, from its first value, last value and step; the standard forbids to change the control variable (7.3.3.4). Leave the loop with EXIT, or write WHILE."
+        wrong "PROGRAM p\nVAR\n  i : INT;\nEND_VAR\n  FOR i := 1 TO 9 DO\n    i := i + 1;\n  END_FOR;\nEND_PROGRAM\n"
+        right "PROGRAM p\nVAR\n  i : INT;\nEND_VAR\n  FOR i := 1 TO 9 BY 2 DO\n    ;\n  END_FOR;\nEND_PROGRAM\n"
+    }
+    LITERAL_CONDITION = "S0076" Warning "a condition that is written as TRUE or FALSE" {
+        "The branch is always or never taken: often something left over from a trial. A named CONSTANT makes a switch of it."
+        wrong "PROGRAM p\nVAR\n  a : INT;\nEND_VAR\n  IF FALSE THEN\n    a := 1;\n  END_IF;\nEND_PROGRAM\n"
+        right "PROGRAM p\nVAR\n  a : INT;\nEND_VAR\nVAR CONSTANT\n  trial : BOOL := FALSE;\nEND_VAR\n  IF trial THEN\n    a := 1;\n  END_IF;\nEND_PROGRAM\n"
+    }
+    MISSING_VALUES = "S0077" Note "a CASE leaves values of its enumeration out" {
+        "For a value without an arm the CASE does nothing. An ELSE, even with `;` alone, says that this is meant."
+        wrong "TYPE\n  C : (red, yellow, green);\nEND_TYPE\nPROGRAM p\nVAR\n  c : C;\n  a : INT;\nEND_VAR\n  CASE c OF\n    red: a := 1;\n    green: a := 2;\n  END_CASE;\nEND_PROGRAM\n"
+        right "TYPE\n  C : (red, yellow, green);\nEND_TYPE\nPROGRAM p\nVAR\n  c : C;\n  a : INT;\nEND_VAR\n  CASE c OF\n    red: a := 1;\n    green: a := 2;\n  ELSE\n    a := 0;\n  END_CASE;\nEND_PROGRAM\n"
+    }
 }

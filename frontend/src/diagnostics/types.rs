@@ -116,4 +116,14 @@ rules! {
         wrong "TYPE\n  C : (red, green);\nEND_TYPE\nPROGRAM p\nVAR\n  c : C;\n  a : INT;\nEND_VAR\n  a := c;\nEND_PROGRAM\n"
         right "TYPE\n  C : INT (red, green);\nEND_TYPE\nPROGRAM p\nVAR\n  c : C;\n  a : INT;\nEND_VAR\n  a := c;\nEND_PROGRAM\n"
     }
+    REAL_EQUALITY = "T0120" Warning "REAL values compared for equality" {
+        "Two ways to compute the same number rarely end in the same bits: 0.1 + 0.2 is not 0.3. Comparing with a whole number, such as 0.0 before a division, is left alone."
+        wrong "PROGRAM p\nVAR\n  a : REAL;\n  b : REAL;\n  q : BOOL;\nEND_VAR\n  q := a = b * 0.1;\nEND_PROGRAM\n"
+        right "PROGRAM p\nVAR\n  a : REAL;\n  b : REAL;\n  q : BOOL;\nEND_VAR\n  q := ABS(a - b * 0.1) < 1.0E-6;\nEND_PROGRAM\n"
+    }
+    FIXED_COMPARISON = "T0121" Warning "a comparison that is always TRUE or always FALSE" {
+        "The type of one side can not hold a value for which the answer would be another one: an unsigned number is never below 0."
+        wrong "PROGRAM p\nVAR\n  n : UINT;\n  q : BOOL;\nEND_VAR\n  q := n >= 0;\nEND_PROGRAM\n"
+        right "PROGRAM p\nVAR\n  n : UINT;\n  q : BOOL;\nEND_VAR\n  q := n > 0;\nEND_PROGRAM\n"
+    }
 }

@@ -1,0 +1,57 @@
+//! Warnings over programs that people wrote and trust: a rule that complains about them is wrong too often.
+
+use khz_frontend::{CompileOptions, SourceInput, check};
+use std::path::{Path, PathBuf};
+
+/// Codes of the rules in `src/lint/`, and of the note about CASE.
+fn is_lint(code: &str) -> bool {
+    ("S0070".."S0080").contains(&code) || ("T0120".."T0130").contains(&code)
+}
+
+fn programs(folder: &Path, found: &mut Vec<PathBuf>) {
+    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+        let path = entry.path();
+        if path.is_dir() {
+            programs(&path, found);
+        } else if path.extension().is_some_and(|ending| ending == "st") {
+            found.push(path);
+        }
+    }
+    found.sort();
+}
+
+fn lints(path: &Path) -> Vec<String> {
+    let bytes = std::fs::read(path).expect("a readable program");
+    let name = path.display().to_string();
+    let found = check(&[SourceInput { name, bytes }], &CompileOptions::default());
+    let lints = found.diagnostics.iter().filter(|one| is_lint(one.code()));
+    lints.map(|one| format!("{} {} {}", found.sources.place(one.span), one.code(), one.message)).collect()
+}
+
+#[test]
+fn trusted_programs_have_no_warnings() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut files = Vec::new();
+    // The workloads are no part of the repository; where they are, they count.
+    for folder in [root.join("../examples"), root.join("tests/samples"), PathBuf::from("/work/shared/workloads")] {
+        programs(&folder, &mut files);
+    }
+    assert!(files.len() >= 5, "{files:?}");
+    let all: Vec<String> = files.iter().flat_map(|path| lints(path)).collect();
+    assert!(all.is_empty(), "{}", all.join("\n"));
+}
+
+#[test]
+fn in_the_conformance_programs_what_is_strange_on_purpose_is_found() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/conformance");
+    for (program, line, code) in [
+        ("6.5-variables/014_global_hidden.st", 7, "S0074"),
+        ("7.3.3-statements/008_if_empty_branches.st", 7, "S0073"),
+        ("7.3.3-statements/052_for_control_written.st", 8, "S0075"),
+        ("7.3.3-statements/132_nan_conditions_real.st", 15, "T0120"),
+    ] {
+        let all = lints(&folder.join(program));
+        let wanted = format!("{program}:{line}:");
+        assert!(all.iter().any(|one| one.contains(&wanted) && one.contains(code)), "{program}: {all:?}");
+    }
+}
