@@ -143,6 +143,9 @@ impl Mutant {
 pub fn spoil(random: &mut Random, base: &Base) -> Mutant {
     if random.chance(75) {
         let mut container = base.container.clone();
+        // Nobody can sign what others change; mutants of the file keep their signatures, which are wrong then.
+        container.content_signature.clear();
+        container.debug_signature.clear();
         let mut kinds = Vec::new();
         let weights: Vec<usize> = KINDS.iter().map(|kind| kind.weight).collect();
         for _ in 0..random.one_of([1, 1, 1, 2, 3]) {

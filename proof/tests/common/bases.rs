@@ -3,8 +3,9 @@
 
 use std::path::{Path, PathBuf};
 
+use ed25519_dalek::{Signer, SigningKey};
 use khz_bytecode::assembler::assemble;
-use khz_bytecode::container::{Container, strip};
+use khz_bytecode::container::{Container, content_hash, debug_hash, signature_section, strip};
 use khz_frontend::{CompileOptions, SourceInput, compile};
 use khz_proof::bytecode::generate;
 use khz_proof::mutate::Pool;
@@ -39,7 +40,17 @@ pub fn texts(generated: u64, further: &[PathBuf]) -> Vec<Vec<u8>> {
     texts.chain((0..generated).map(|seed| st::print::print(&st::generate(seed)).into_bytes())).collect()
 }
 
-/// Containers of all sizes: `generated` ones, the assembly texts of the tests, and the programs among the texts, every other one stripped.
+/// Signs what a container says, and what its debug section says when it has one.
+fn sign(container: &mut Container) {
+    let key = SigningKey::from_bytes(&[7; 32]);
+    let section = |hash: &[u8; 32]| signature_section(key.verifying_key().as_bytes(), &key.sign(hash).to_bytes());
+    container.content_signature = section(&content_hash(container).expect("a container that can be written"));
+    if container.debug.is_some() {
+        container.debug_signature = section(&debug_hash(container).expect("a container that can be written"));
+    }
+}
+
+/// Containers of all sizes, one in eight of the compiled ones signed: `generated` ones, the assembly texts of the tests, and the programs among the texts, every other one stripped.
 pub fn pool(generated: u64, texts: &[Vec<u8>]) -> Pool {
     let assembly =
         ["tests/bytecode", "bytecode/tests/verifier"].map(|folder| files(&root().join(folder), &["kasm", "khza"]));
@@ -55,6 +66,10 @@ pub fn pool(generated: u64, texts: &[Vec<u8>]) -> Pool {
             let mut container: Container = resource.container;
             if number % 2 == 0 {
                 strip(&mut container);
+            }
+            // Of stripped and whole ones as many.
+            if number % 16 < 2 {
+                sign(&mut container);
             }
             container
         })
