@@ -131,7 +131,8 @@ fn words_of_tests_are_names_elsewhere() {
                 TEST 't'\nVAR ok : BOOL; setup, mock : INT; END_VAR\nok := ASSERT_TRUE(3); setup := 1; mock := setup;\nEND_TEST\n";
     expect![[r#"
         t.st:2:44 S0070 the variable `advance_time` is never used (leave it out)
-    "#]].assert_eq(&messages(text));
+    "#]]
+    .assert_eq(&messages(text));
 }
 
 #[test]

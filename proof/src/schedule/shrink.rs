@@ -1,6 +1,6 @@
 //! Makes a plan that shows something small: one part after another is left out as long as what is left still shows it.
 
-use super::plan::{Action, Command, Deed, Form, Instance, Plan, Policy, Single, Task, Time, Trigger};
+use super::plan::{Action, Command, Deed, Form, Home, Instance, Plan, Policy, Single, Task, Time, Trigger};
 
 /// The smallest plan found that still `shows` it, after at most `tries` questions.
 pub fn shrink(plan: &Plan, shows: &mut dyn FnMut(&Plan) -> bool, tries: usize) -> Plan {
@@ -70,6 +70,7 @@ fn candidates(plan: &Plan) -> Vec<Plan> {
             with(&|plan| plan.instances[at].sink = None);
         }
     }
+    with(&|plan| plan.globals.fill(Home::Any));
     with(&|plan| plan.watchdog_us = 0);
     with(&|plan| plan.input_poll_ns = 0);
     with(&|plan| plan.time = Time::Virtual);

@@ -21,6 +21,8 @@ fn a_fault_of_the_scheduler_is_found_and_made_small() {
         check(seed, &mut Tally::default(), TRIES).expect("it shows again")
     };
     let (_, small) = report.split_once("\nsmall: ").expect("a report has its small plan");
-    assert_eq!((small.matches(" TASK t").count(), small.matches("PROGRAM P").count()), (1, 1), "{report}");
+    // A task that sleeps too long is late without a program of its own.
+    let count = |word| small.matches(word).count();
+    assert!(count(" TASK t") == 1 && count("PROGRAM P") <= 1, "{report}");
     assert!(small.contains("lost_cycles: 1"), "{report}");
 }
