@@ -10,6 +10,8 @@
 //! - `khz-interp`, `khz-jit`: the engines
 //! - `khz-scheduler`: tasks, clocks, watchdogs, statistics
 //!
+//! [`lockstep`] holds engines against each other round by round, [`traces`] a program against a recorded trace.
+//!
 //! The binary `khz` is in `src/main.rs`, a file for each subcommand in `src/cli/`.
 
 pub mod files;
