@@ -48,7 +48,8 @@ pub fn reduce(case: &Case, compare: &Compare<'_>, tries: usize) -> Option<Report
     let text = print(&small.source);
     let difference = compare(&text, &small.rounds).unwrap_or(first);
     let roots = roots(&small.source, difference.variable.as_deref());
-    let matters = |path: &str| roots.iter().any(|root| is_below(path, root));
+    // Of a variable whose instance has another name than its program nothing is known: then every variable may matter.
+    let matters = |path: &str| roots.is_empty() || roots.iter().any(|root| is_below(path, root));
     let traces = difference.traces.only(&matters, MOST_VARIABLES);
     let lines = (before.lines().count(), text.lines().count());
     Some(Report { case: small, text, difference, traces, tries: used, lines })
