@@ -75,15 +75,33 @@ pub struct Sources {
     pub dialect: Option<DialectArg>,
 }
 
+/// How diagnostics are printed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum CheckFormat {
+    /// For people.
+    Human,
+    /// One JSON array.
+    Json,
+    /// One SARIF 2.1.0 log, for code hosts and editors.
+    Sarif,
+}
+
+impl CheckFormat {
+    /// How other failures are printed then.
+    pub fn failures(self) -> Format {
+        if self == CheckFormat::Json { Format::Json } else { Format::Human }
+    }
+}
+
 /// `khz check`.
 #[derive(Debug, Args)]
 pub struct CheckArgs {
     #[command(flatten)]
     #[allow(missing_docs, reason = "clap would show it as help of the group")]
     pub sources: Sources,
-    #[command(flatten)]
-    #[allow(missing_docs, reason = "clap would show it as help of the group")]
-    pub common: Common,
+    /// How diagnostics are printed
+    #[arg(long, value_enum, default_value = "human")]
+    pub format: CheckFormat,
 }
 
 /// `khz explain`.

@@ -13,6 +13,7 @@ mod output;
 mod page;
 mod report;
 mod run;
+mod sarif;
 mod session;
 mod stopwatch;
 mod test;
@@ -60,7 +61,7 @@ pub fn main() -> ExitCode {
         }
     };
     let (format, outcome) = match &cli.command {
-        Command::Check(args) => (args.common.format, check::run(args)),
+        Command::Check(args) => (args.format.failures(), check::run(args)),
         Command::Explain(args) => (args.common.format, explain::run(args)),
         Command::Build(args) => (args.common.format, build::run(args)),
         Command::Verify(args) => (args.common.format, verify::run(args)),
