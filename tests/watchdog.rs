@@ -4,7 +4,7 @@
 
 mod common;
 
-use std::process::{Command, Stdio};
+use std::process::{Child, Command, Output, Stdio};
 use std::time::Duration;
 
 use common::{Scratch, khz, stderr};
@@ -12,17 +12,34 @@ use common::{Scratch, khz, stderr};
 const ENDLESS: &str =
     "PROGRAM main\nVAR n : DINT; END_VAR\n  WHILE TRUE DO\n    n := n + 1;\n  END_WHILE;\nEND_PROGRAM\n";
 
+/// A run that nothing ends is ended by the test, after this many pauses of 10 ms, and fails it: a minute, hundreds of times what it may take.
+const PAUSES: u32 = 6_000;
+
+/// What a run leaves behind. One that goes on for a minute is killed, and so has no exit status.
+fn output_of(mut child: Child) -> Output {
+    for _ in 0..PAUSES {
+        if child.try_wait().unwrap().is_some() {
+            return child.wait_with_output().unwrap();
+        }
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    child.kill().unwrap();
+    child.wait_with_output().unwrap()
+}
+
+/// Starts `khz` with its messages kept, and waits for its end.
+fn ended(command: &mut Command) -> Output {
+    output_of(command.stderr(Stdio::piped()).spawn().unwrap())
+}
+
 #[test]
 fn a_watchdog_ends_an_endless_loop_on_both_clocks() {
     let scratch = Scratch::new("watchdog");
     let path = scratch.write("endless.st", ENDLESS);
     for engine in ["interp", "jit"] {
         for clock in ["real", "virtual"] {
-            let output = khz()
-                .args(["run", "--engine", engine, "--clock", clock, "--watchdog-us", "10000"])
-                .arg(&path)
-                .output()
-                .unwrap();
+            let arguments = ["run", "--engine", engine, "--clock", clock, "--watchdog-us", "10000"];
+            let output = ended(khz().args(arguments).arg(&path));
             let text = stderr(&output);
             assert_eq!(output.status.code(), Some(3), "{engine} {clock}: {text}");
             assert!(text.contains("watchdog"), "{engine} {clock}: {text}");
@@ -38,12 +55,8 @@ fn fuel_stops_both_engines_at_the_same_place() {
     let path = scratch.write("endless.st", ENDLESS);
     let dumps = ["interp", "jit"].map(|engine| {
         let dump = scratch.path(&format!("{engine}.json"));
-        let output = khz()
-            .args(["run", "--engine", engine, "--clock", "virtual", "--watchdog-us", "10000", "--dump-vars"])
-            .arg(&dump)
-            .arg(&path)
-            .output()
-            .unwrap();
+        let arguments = ["run", "--engine", engine, "--clock", "virtual", "--watchdog-us", "10000", "--dump-vars"];
+        let output = ended(khz().args(arguments).arg(&dump).arg(&path));
         assert_eq!(output.status.code(), Some(3));
         (std::fs::read_to_string(dump).unwrap(), stderr(&output))
     });
@@ -61,7 +74,7 @@ fn signalled(engine: &str, name: &str, source: &str, signals: &[(&str, Duration)
         let sent = Command::new("kill").args([*signal, &child.id().to_string()]).status().unwrap();
         assert!(sent.success());
     }
-    let output = child.wait_with_output().unwrap();
+    let output = output_of(child);
     (output.status.code(), stderr(&output))
 }
 
