@@ -1,24 +1,38 @@
-//! Compares generated Structured Text with its tree over many programs: `st FIRST_SEED COUNT`. What differs is printed small.
+//! Compares generated Structured Text with its tree over many programs: `st FIRST_SEED COUNT [--threads N] [--scans N] [--fuel N]
+//! [--passes N]`; `--fuel` and `--passes` say of one of how many programs. What differs is printed small; the exit status says whether anything did.
 #![allow(clippy::print_stdout, reason = "a program for people")]
 
+mod common;
 #[path = "../tests/common/mod.rs"]
 mod engines;
 #[path = "../tests/common/st.rs"]
 mod oracle;
 
-fn main() {
-    let mut arguments = std::env::args().skip(1);
-    let mut number = || arguments.next().and_then(|word| word.parse::<u64>().ok());
-    let (first, count) = (number().unwrap_or(0), number().unwrap_or(1000));
-    let mut tally = oracle::Tally::default();
-    let mut differences = 0;
-    for seed in first..first + count {
-        let tries = if differences < 8 { 600 } else { 0 };
-        if let Some(found) = oracle::check_seed(seed, &mut tally, tries) {
-            differences += 1;
-            let lines = if tries > 0 { 200 } else { 2 };
-            println!("==== {}", found.lines().take(lines).collect::<Vec<_>>().join("\n"));
+use std::process::ExitCode;
+
+use khz_proof::campaign::Report;
+use oracle::{Plan, Tally, check_seed};
+
+/// How many findings are made small.
+const REDUCED: usize = 8;
+
+fn main() -> ExitCode {
+    let arguments = common::Arguments::read(1000, &["scans", "fuel", "passes", "tries"]);
+    let usual = Plan::default();
+    let plan = Plan {
+        scans: arguments.option("scans", usual.scans),
+        fuel: arguments.option("fuel", usual.fuel),
+        passes: arguments.option("passes", usual.passes),
+    };
+    let report: Report<Tally> = arguments.search(|seed, tally: &mut Tally| check_seed(seed, plan, tally, 0));
+    let tries = arguments.option("tries", 1500) as usize;
+    for (number, finding) in report.findings.iter().enumerate() {
+        println!("==== {}", finding.description.lines().take(4).collect::<Vec<_>>().join(" | "));
+        if number < REDUCED && !finding.description.starts_with("panic") {
+            let small = check_seed(finding.seed, plan, &mut Tally::default(), tries);
+            println!("{}", small.unwrap_or_default().lines().take(120).collect::<Vec<_>>().join("\n"));
         }
     }
-    println!("{differences} differences\n{}", tally.report());
+    println!("{}", report.figures.report());
+    ExitCode::from(u8::from(!report.findings.is_empty()))
 }

@@ -8,7 +8,7 @@ mod engines;
 use c::{Tally, compare_seeds};
 
 /// Programs of the test, in one C file; `examples/c_oracle.rs` runs more.
-const PROGRAMS: u64 = 300;
+const PROGRAMS: u64 = 600;
 
 #[test]
 fn arithmetic_is_what_it_is_in_c() {

@@ -5,67 +5,193 @@ mod engines;
 #[path = "common/st.rs"]
 mod oracle;
 
-use oracle::{Tally, check_seed};
+use khz_machine::library::{blocks, functions};
+use khz_proof::campaign::{Campaign, Report};
+use khz_proof::st::blocks::Standard;
+use khz_proof::st::functions::compares;
+use khz_proof::st::tree::{Def, Kind, Stmt};
+use oracle::{Plan, Tally, check_seed};
 
 /// Programs of the test; `examples/st.rs` runs more.
-const PROGRAMS: u64 = 400;
+const PROGRAMS: u64 = 8000;
 
 #[test]
 fn generated_programs_mean_what_their_trees_mean() {
-    let workers = 2;
-    let run = |worker: u64| {
-        let mut tally = Tally::default();
-        let found: Vec<String> = (0..PROGRAMS)
-            .filter(|seed| seed % workers == worker)
-            .filter_map(|seed| check_seed(seed, &mut tally, 300))
-            .collect();
-        (tally, found)
-    };
-    let results: Vec<_> = std::thread::scope(|scope| {
-        let running: Vec<_> = (0..workers).map(|worker| scope.spawn(move || run(worker))).collect();
-        running.into_iter().map(|worker| worker.join().expect("a worker")).collect()
-    });
-    let found: Vec<&String> = results.iter().flat_map(|(_, found)| found).collect();
-    assert!(found.is_empty(), "{} programs differ:\n{}", found.len(), found[0]);
-    let reached = |word: &str| results.iter().any(|(tally, _)| tally.words.contains_key(word));
-    for word in oracle::names().chain([
-        "STRING",
-        "FOR",
-        "WHILE",
-        "REPEAT",
-        "CASE",
-        "EXIT",
-        "CONTINUE",
-        "RETURN",
-        "VAR_IN_OUT",
-        "VAR_TEMP",
-    ]) {
-        assert!(reached(word), "no program has {word}");
-    }
+    let campaign = Campaign { first: 0, count: PROGRAMS, threads: 2, most_findings: 1 };
+    let plan = |seed: u64| Plan { scans: if seed % 4 == 0 { 10 } else { 4 }, fuel: 16, passes: 0 };
+    let report: Report<Tally> =
+        campaign.run(|seed, tally: &mut Tally| check_seed(seed, plan(seed), tally, 300), |_| ());
+    assert!(report.findings.is_empty(), "a program differs:\n{}", report.findings[0].description);
+    let tally = report.figures;
+    assert_eq!(tally.programs + tally.refused, PROGRAMS);
+    assert!(tally.refused * 8 < PROGRAMS, "{} programs are refused", tally.refused);
+    assert!(tally.too_long * 20 < tally.programs, "{} programs take too long to say anything", tally.too_long);
     for trap in ["divide by zero", "array index", "range"] {
-        assert!(results.iter().any(|(tally, _)| tally.traps.contains_key(trap)), "no program traps: {trap}");
+        assert!(tally.traps.contains_key(trap), "no program traps: {trap}");
     }
-    let programs: u64 = results.iter().map(|(tally, _)| tally.programs).sum();
-    let cut: u64 = results.iter().map(|(tally, _)| tally.too_long).sum();
-    let refused: u64 = results.iter().map(|(tally, _)| tally.refused).sum();
-    assert_eq!(programs + refused, PROGRAMS);
-    assert!(refused * 8 < PROGRAMS, "{refused} programs are refused");
-    assert!(cut * 20 < programs, "{cut} programs take too long to say anything");
+    covers_the_library(&tally);
+    covers_the_language(&tally);
+}
+
+/// Every row of the library, with many of the types that it takes.
+fn covers_the_library(tally: &Tally) {
+    for row in functions::TABLE {
+        let types = tally.coverage.types_of(row.name);
+        let single = !row.parameters.iter().any(|parameter| parameter.class.is_generic())
+            || row.result == functions::ResultRule::WantedInteger;
+        let floats = row.parameters[0].class == functions::TypeClass::AnyReal;
+        let wanted = match (single, floats) {
+            (true, _) => 1,
+            (false, true) => 2,
+            (false, false) => 8,
+        };
+        assert!(types >= wanted, "{} is called with {types} types", row.name);
+        assert!(!compares(row.function) || types >= 16, "{} compares {types} types", row.name);
+    }
+    for block in blocks::all() {
+        assert!(tally.coverage.blocks.contains_key(&block.name), "no program calls {}", block.name);
+    }
+    let (mut known, mut made): (Vec<String>, Vec<String>) =
+        (blocks::all().map(|block| block.name).collect(), Standard::all().into_iter().map(Standard::name).collect());
+    known.sort_unstable();
+    made.sort_unstable();
+    assert_eq!(known, made, "the blocks of the library and those that the evaluator knows");
+}
+
+fn covers_the_language(tally: &Tally) {
+    let conversions = &tally.coverage.conversions;
+    for from in Kind::ALL {
+        for to in Kind::ALL.into_iter().filter(|to| *to != from) {
+            let names = (from.name().to_string(), to.name().to_string());
+            assert!(conversions.contains_key(&(names.0, names.1, false)), "no {}_TO_{}", from.name(), to.name());
+            let becomes = tally.coverage.widenings.contains_key(&(from, to));
+            assert!(becomes || !from.becomes(to), "no {} becomes a {}", from.name(), to.name());
+        }
+        for (from, to) in [(from.name(), "STRING"), ("STRING", from.name()), ("enumeration", from.name())] {
+            let known = conversions.contains_key(&(from.to_string(), to.to_string(), false));
+            assert!(known, "no {from}_TO_{to}");
+        }
+    }
+    for feature in [
+        "=>",
+        "ARRAY",
+        "AT",
+        "CASE",
+        "CONFIGURATION",
+        "CONTINUE",
+        "EN",
+        "ENO",
+        "EXIT",
+        "FOR",
+        "IF",
+        "NOT",
+        "REPEAT",
+        "RETAIN",
+        "RETURN",
+        "SINGLE",
+        "SINGLE and INTERVAL",
+        "STRUCT",
+        "VAR CONSTANT",
+        "VAR_INPUT",
+        "VAR_IN_OUT argument",
+        "VAR_OUTPUT",
+        "VAR_TEMP",
+        "WHILE",
+        "WITH",
+        "array of blocks",
+        "assignment of a whole",
+        "bit access",
+        "block call",
+        "connection",
+        "direct address",
+        "element of several dimensions",
+        "enumeration with a base",
+        "function call",
+        "function statement",
+        "function without result",
+        "instance without task",
+        "part access",
+        "composite result",
+        "sign",
+        "startup function",
+        "subrange",
+    ] {
+        assert!(tally.coverage.features.contains_key(feature), "no program has: {feature}");
+    }
 }
 
 /// The tree without calls of blocks, the text with them: the comparison has to see it.
 #[test]
 fn a_tree_that_means_something_else_is_found() {
     let mut found = 0;
-    for seed in 0..40 {
+    let mut tried = 0;
+    for seed in 0..120 {
         let source = khz_proof::st::generate(seed);
         let text = khz_proof::st::print::print(&source);
         let mut other = source.clone();
-        let mut tally = Tally::default();
         for unit in &mut other.units {
-            unit.body.retain(|stmt| !matches!(stmt, khz_proof::st::tree::Stmt::Call(..)));
+            unit.body.retain(|stmt| !matches!(stmt, Stmt::Call(..)));
         }
-        found += usize::from(oracle::check_text(&text, &other, seed, &mut tally).is_err());
+        let last = source.units.last().map_or(0, |unit| unit.body.len());
+        if other.units.last().map_or(0, |unit| unit.body.len()) != last {
+            tried += 1;
+            let result = oracle::check_text(&text, None, &other, seed, Plan::default(), &mut Tally::default());
+            found += usize::from(result.is_err());
+        }
     }
-    assert!(found >= 10, "{found} of 40 programs without their calls of blocks are found out");
+    assert!(found * 3 >= tried, "{found} of {tried} programs without their calls of blocks are found out");
+}
+
+/// The wrong task, the wrong order, a connection less: the comparison has to see it.
+#[test]
+fn a_configuration_that_means_something_else_is_found() {
+    let mut found = [0; 3];
+    for seed in 0..400 {
+        let source = khz_proof::st::generate(seed);
+        if source.config.is_none() {
+            continue;
+        }
+        let text = khz_proof::st::print::print(&source);
+        for (number, found) in found.iter_mut().enumerate() {
+            let mut other = source.clone();
+            let Some(config) = &mut other.config else { continue };
+            match number {
+                0 => config.instances.reverse(),
+                1 => config.tasks.iter_mut().for_each(|task| task.interval_us = task.interval_us.map(|us| us * 2)),
+                _ => config.instances.iter_mut().for_each(|instance| instance.args.truncate(1)),
+            }
+            let result = oracle::check_text(&text, None, &other, seed, Plan::default(), &mut Tally::default());
+            *found += usize::from(result.is_err());
+        }
+    }
+    assert!(found.iter().all(|found| *found >= 5), "{found:?} configurations are found out");
+}
+
+/// Where a trap happened is compared: a text of which a line is missing at the top is found out by that alone.
+#[test]
+fn a_trap_at_another_place_is_found() {
+    let mut found = 0;
+    for seed in 0..1500 {
+        let source = khz_proof::st::generate(seed);
+        let (text, positions) = khz_proof::st::print::print_positions(&source);
+        let moved = format!("\n{text}");
+        let result =
+            oracle::check_text(&moved, Some(&positions), &source, seed, Plan::default(), &mut Tally::default());
+        found += usize::from(matches!(result, Err(found) if found.class.starts_with("trap place")));
+    }
+    assert!(found >= 10, "{found} moved traps are found");
+}
+
+/// The limits of an enumeration's base are reached, so that its width counts.
+#[test]
+fn enumerations_of_every_base_are_made() {
+    let mut bases = std::collections::BTreeSet::new();
+    for seed in 0..2000 {
+        for ty in khz_proof::st::generate(seed).types {
+            if let Def::Enum(Some(base), _) = ty.def {
+                bases.insert(base);
+            }
+        }
+    }
+    assert_eq!(bases.len(), Kind::INTEGERS.len(), "{bases:?}");
 }

@@ -62,7 +62,10 @@ fn bench<'b>(makers: &'b [Maker<'b>]) -> Bench<'b> {
 fn a_value_is_traced_to_a_small_program() {
     let wrong = confuse(NumericOp::I32Xor, NumericOp::I32Or);
     let makers = makers(&wrong);
-    let (case, report) = find(&bench(&makers), |_, _, _| true, 600);
+    let is_written = |found: &Difference, _: &str, _: &[Round]| {
+        found.statement.as_ref().is_some_and(|statement| statement.text.contains(" XOR "))
+    };
+    let (case, report) = find(&bench(&makers), is_written, 600);
     let found = &report.difference;
     assert_eq!((&*found.left, &*found.right, &found.sort), ("interp", "wrong", &Sort::Value));
     assert!(report.lines.1 <= 12 && report.lines.1 * 3 < report.lines.0, "{report}");

@@ -118,6 +118,7 @@ impl<'a> Checker<'_, 'a> {
             }
             let found = match class {
                 TypeClass::Bool => self.coerce(found, BOOL),
+                TypeClass::Count if matches!(row.function, F::Rol | F::Ror) => self.turns(found),
                 TypeClass::Count => self.count(found),
                 _ => found,
             };
@@ -134,6 +135,12 @@ impl<'a> Checker<'_, 'a> {
             _ if value.ty == Ty::Error => value,
             _ => Expr { kind: ExprKind::ToIndex(Box::new(value)), ty: DINT, span },
         }
+    }
+
+    /// The count of a rotation: it is taken modulo a width, so that its low bits say all.
+    fn turns(&mut self, value: Expr) -> Expr {
+        let value = self.settle(value, DINT);
+        if value.ty == Ty::Error { value } else { self.convert(value, E::Dint, false) }
     }
 
     fn check_class(&mut self, row: &FunctionRow, value: &Expr, class: TypeClass) -> bool {

@@ -6,7 +6,7 @@ use khz_bytecode::value::IntegerType;
 use super::expr::Checker;
 use khz_bytecode::limits::MAX_LOOP_DEPTH;
 
-use super::tree::{CaseArm, Expr, ExprKind, ForStmt, Place, Step, Stmt, StmtKind};
+use super::tree::{Call, CaseArm, Expr, ExprKind, ForStmt, Place, Step, Stmt, StmtKind};
 use super::types::{Const, DINT, Ty, TyKind, integer_type, is_bits, is_integer, limits, widen};
 use crate::diagnostics::{Diagnostic, semantic as names, types as rules};
 use crate::source::Span;
@@ -296,22 +296,27 @@ impl<'a> Checker<'_, 'a> {
 
 /// A statement whose call has EN: with a FALSE EN neither the call nor the assignment of its result happens.
 fn skip_when_disabled(stmt: Stmt) -> Stmt {
-    let Stmt { kind, span } = stmt;
-    let kind = match kind {
-        StmtKind::Assign { target, value: Expr { kind: ExprKind::Call(mut call), ty, span: at } }
-            if call.en.is_some() || call.eno.is_some() =>
-        {
-            let (en, eno, is_given) = (call.en.take(), call.eno.take(), call.eno_is_given);
-            let value = Expr { kind: ExprKind::Call(call), ty, span: at };
-            guarded(en, eno.as_ref(), is_given, Stmt { kind: StmtKind::Assign { target, value }, span })
-        }
-        StmtKind::Call(mut call) if call.en.is_some() || call.eno.is_some() => {
-            let (en, eno, is_given) = (call.en.take(), call.eno.take(), call.eno_is_given);
-            guarded(en, eno.as_ref(), is_given, Stmt { kind: StmtKind::Call(call), span })
-        }
-        other => other,
+    let Stmt { mut kind, span } = stmt;
+    let call = match &mut kind {
+        StmtKind::Assign { value, .. } => assigned_call(value),
+        StmtKind::Call(call) => Some(call.as_mut()),
+        _ => None,
     };
-    Stmt { kind, span }
+    let Some(call) = call.filter(|call| call.en.is_some() || call.eno.is_some()) else { return Stmt { kind, span } };
+    let (en, eno, is_given) = (call.en.take(), call.eno.take(), call.eno_is_given);
+    Stmt { kind: guarded(en, eno.as_ref(), is_given, Stmt { kind, span }), span }
+}
+
+/// The call whose result is assigned. What converts or checks it by itself stands at the same place; a conversion that is written does not.
+fn assigned_call(value: &mut Expr) -> Option<&mut Call> {
+    let span = value.span;
+    match &mut value.kind {
+        ExprKind::Call(call) => Some(call),
+        ExprKind::Convert { value: inner, .. } | ExprKind::Check(inner, ..) if inner.span == span => {
+            assigned_call(inner)
+        }
+        _ => None,
+    }
 }
 
 fn guarded(en: Option<Expr>, eno: Option<&Place>, eno_is_given: bool, inner: Stmt) -> StmtKind {

@@ -172,7 +172,7 @@ impl<'b, 'p> FunctionBuilder<'b, 'p> {
             }
             StmtKind::If { branches, otherwise } => self.if_statement(branches, otherwise),
             StmtKind::Case { selector, arms, otherwise } => self.case(selector, arms, otherwise),
-            StmtKind::For(found) => self.for_loop(found),
+            StmtKind::For(found) => self.for_loop(found, statement.span),
             StmtKind::While { condition, body, end } => self.while_loop(condition, body, *end),
             StmtKind::Repeat { body, until } => self.repeat_loop(body, until),
             StmtKind::Exit => {
@@ -257,7 +257,7 @@ impl<'b, 'p> FunctionBuilder<'b, 'p> {
         self.e.bind(exit);
     }
 
-    fn for_loop(&mut self, found: &ForStmt) {
+    fn for_loop(&mut self, found: &ForStmt, span: Span) {
         let elementary = self.elementary(found.control.ty);
         let Some(kind) = integer_type(elementary) else { return };
         let register = if kind.value_type() == ValueType::I64 { Storage::I64 } else { Storage::I32 };
@@ -282,6 +282,8 @@ impl<'b, 'p> FunctionBuilder<'b, 'p> {
         self.value(&found.from);
         self.value(&found.to);
         self.value(&found.by);
+        // A step of 0 is the statement's, wherever its value came from.
+        self.e.mark(span);
         self.e.push(I::ForEnter { id, exit: done }, 3, 0);
         let header = self.e.bind_for_header();
         if let Some(slot) = hidden {

@@ -1,12 +1,13 @@
 //! Calls to instructions.
 
+use khz_bytecode::container::ElementaryType;
 use khz_bytecode::instruction::Instruction as I;
 use khz_bytecode::value::{BytePlace, LocalType, RefType, SlotPlace, Storage};
 
 use super::body::{CallContext, FunctionBuilder};
 use super::place::{Address, Home};
-use crate::analysis::tree::{Call, Expr, PouInfo, VarClass, VarId};
-use crate::analysis::types::Ty;
+use crate::analysis::tree::{Call, Expr, ExprKind, PouInfo, Stmt, StmtKind, VarClass, VarId};
+use crate::analysis::types::{Const, Ty, Value};
 
 impl FunctionBuilder<'_, '_> {
     /// A call for its effects.
@@ -24,32 +25,45 @@ impl FunctionBuilder<'_, '_> {
     pub(super) fn call_value(&mut self, call: &Call, ty: Ty) {
         let Some(en) = &call.en else {
             self.function_call(call);
+            self.eno(call, true);
             return;
         };
-        // Not enabled, the function gives nothing: zero.
-        let storage = self.b.project.types.storage(ty);
+        // Not enabled, the function gives what a variable of the type begins with.
         let skip = self.e.label();
         let end = self.e.label();
         self.jump_when(en, skip, false);
         self.function_call(call);
+        self.eno(call, true);
         self.e.push(I::Jump { target: end }, 0, 0);
         self.e.bind(skip);
-        match storage {
-            Some(_) => {
-                let elementary = self.elementary(ty);
-                let zero = match elementary {
-                    khz_bytecode::container::ElementaryType::Real => crate::analysis::types::Const::F32(0.0),
-                    khz_bytecode::container::ElementaryType::Lreal => crate::analysis::types::Const::F64(0.0),
-                    _ => crate::analysis::types::Const::Int(0),
-                };
-                self.constant(&zero, elementary);
-            }
-            None => {
-                let offset = self.temporary(ty);
-                self.push_address(BytePlace::Frame, offset, ty);
-            }
+        self.eno(call, false);
+        let default = self.b.project.types.default(ty);
+        if self.b.project.types.storage(ty).is_some() {
+            let elementary = self.elementary(ty);
+            let value = match (default, elementary) {
+                (Value::Scalar(value), _) => value,
+                (_, ElementaryType::Real) => Const::F32(0.0),
+                (_, ElementaryType::Lreal) => Const::F64(0.0),
+                _ => Const::Int(0),
+            };
+            self.constant(&value, elementary);
+        } else {
+            let offset = self.temporary(ty);
+            let from = self.b.template(ty, &default);
+            self.push_address(BytePlace::Frame, offset, ty);
+            self.push_address(BytePlace::Data, from, ty);
+            let target = self.b.type_id(ty);
+            self.e.push(I::Copy { target }, 2, 0);
+            self.push_address(BytePlace::Frame, offset, ty);
         }
         self.e.bind(end);
+    }
+
+    /// Says whether a call inside an expression was made, where nothing else says it: [`Call::eno_is_given`].
+    fn eno(&mut self, call: &Call, was_made: bool) {
+        let Some(target) = call.eno.clone().filter(|_| !(was_made && call.eno_is_given)) else { return };
+        let value = Expr { kind: ExprKind::Const(Const::Int(i64::from(was_made))), ty: target.ty, span: call.span };
+        self.statement(&Stmt { kind: StmtKind::Assign { target, value }, span: call.span });
     }
 
     /// Calls a function. Leaves its result: `None` when it has none.

@@ -2,10 +2,10 @@
 
 use super::tree::{Kind, Value};
 
-/// A standard function block.
+/// What a standard function block does.
 #[allow(missing_docs, reason = "the names are the standard's")]
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Standard {
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Block {
     RTrig,
     FTrig,
     Sr,
@@ -18,56 +18,78 @@ pub enum Standard {
     Tp,
 }
 
+/// A standard function block: what it does, and the type that its name tells, as `CTU_DINT` does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Standard {
+    /// What it does.
+    pub block: Block,
+    /// Type in its name.
+    pub form: Option<Kind>,
+}
+
 /// Name, type, whether it is an input.
-type Field = (&'static str, Kind, bool);
+pub type Field = (&'static str, Kind, bool);
 
 impl Standard {
     /// All of them.
-    pub const ALL: [Standard; 10] = [
-        Standard::RTrig,
-        Standard::FTrig,
-        Standard::Sr,
-        Standard::Rs,
-        Standard::Ctu,
-        Standard::Ctd,
-        Standard::Ctud,
-        Standard::Ton,
-        Standard::Tof,
-        Standard::Tp,
-    ];
+    #[must_use]
+    pub fn all() -> Vec<Standard> {
+        const COUNTS: [Option<Kind>; 6] =
+            [None, Some(Kind::Int), Some(Kind::Dint), Some(Kind::Lint), Some(Kind::Udint), Some(Kind::Ulint)];
+        const TIMES: [Option<Kind>; 3] = [None, Some(Kind::Time), Some(Kind::Ltime)];
+        let rows: [(Block, &[Option<Kind>]); 10] = [
+            (Block::RTrig, &[None]),
+            (Block::FTrig, &[None]),
+            (Block::Sr, &[None]),
+            (Block::Rs, &[None]),
+            (Block::Ctu, &COUNTS),
+            (Block::Ctd, &COUNTS),
+            (Block::Ctud, &COUNTS),
+            (Block::Ton, &TIMES),
+            (Block::Tof, &TIMES),
+            (Block::Tp, &TIMES),
+        ];
+        rows.iter()
+            .flat_map(|(block, forms)| forms.iter().map(|form| Standard { block: *block, form: *form }))
+            .collect()
+    }
 
     /// Its name.
     #[must_use]
-    pub fn name(self) -> &'static str {
-        ["R_TRIG", "F_TRIG", "SR", "RS", "CTU", "CTD", "CTUD", "TON", "TOF", "TP"][self as usize]
+    pub fn name(self) -> String {
+        let name =
+            ["R_TRIG", "F_TRIG", "SR", "RS", "CTU", "CTD", "CTUD", "TON", "TOF", "TP"][self.block as usize].to_string();
+        self.form.map_or(name.clone(), |form| format!("{name}_{}", form.name()))
     }
 
     /// Inputs and outputs.
     #[must_use]
-    pub fn fields(self) -> &'static [Field] {
+    pub fn fields(self) -> Vec<Field> {
         const B: Kind = Kind::Bool;
-        match self {
-            Standard::RTrig | Standard::FTrig => &[("CLK", B, true), ("Q", B, false)],
-            Standard::Sr => &[("S1", B, true), ("R", B, true), ("Q1", B, false)],
-            Standard::Rs => &[("S", B, true), ("R1", B, true), ("Q1", B, false)],
-            Standard::Ctu => {
-                &[("CU", B, true), ("R", B, true), ("PV", Kind::Int, true), ("Q", B, false), ("CV", Kind::Int, false)]
+        let count = self.form.unwrap_or(Kind::Int);
+        let time = self.form.unwrap_or(Kind::Time);
+        match self.block {
+            Block::RTrig | Block::FTrig => vec![("CLK", B, true), ("Q", B, false)],
+            Block::Sr => vec![("S1", B, true), ("R", B, true), ("Q1", B, false)],
+            Block::Rs => vec![("S", B, true), ("R1", B, true), ("Q1", B, false)],
+            Block::Ctu => {
+                vec![("CU", B, true), ("R", B, true), ("PV", count, true), ("Q", B, false), ("CV", count, false)]
             }
-            Standard::Ctd => {
-                &[("CD", B, true), ("LD", B, true), ("PV", Kind::Int, true), ("Q", B, false), ("CV", Kind::Int, false)]
+            Block::Ctd => {
+                vec![("CD", B, true), ("LD", B, true), ("PV", count, true), ("Q", B, false), ("CV", count, false)]
             }
-            Standard::Ctud => &[
+            Block::Ctud => vec![
                 ("CU", B, true),
                 ("CD", B, true),
                 ("R", B, true),
                 ("LD", B, true),
-                ("PV", Kind::Int, true),
+                ("PV", count, true),
                 ("QU", B, false),
                 ("QD", B, false),
-                ("CV", Kind::Int, false),
+                ("CV", count, false),
             ],
-            Standard::Ton | Standard::Tof | Standard::Tp => {
-                &[("IN", B, true), ("PT", Kind::Time, true), ("Q", B, false), ("ET", Kind::Time, false)]
+            Block::Ton | Block::Tof | Block::Tp => {
+                vec![("IN", B, true), ("PT", time, true), ("Q", B, false), ("ET", time, false)]
             }
         }
     }
@@ -86,54 +108,55 @@ impl Standard {
         let count = self.fields().len();
         let mut v: Vec<i128> = parts.iter().map(Value::int).collect();
         let flag = i128::from;
-        match self {
-            Standard::RTrig => {
+        let (lowest, highest) = self.form.unwrap_or(Kind::Int).limits();
+        match self.block {
+            Block::RTrig => {
                 v[1] = flag(v[0] != 0 && v[count] == 0);
                 v[count] = v[0];
             }
-            Standard::FTrig => {
+            Block::FTrig => {
                 v[1] = flag(v[0] == 0 && v[count] != 0);
                 v[count] = v[0];
             }
-            Standard::Sr => v[2] = flag(v[0] != 0 || (v[1] == 0 && v[2] != 0)),
-            Standard::Rs => v[2] = flag(v[1] == 0 && (v[0] != 0 || v[2] != 0)),
-            Standard::Ctu => {
+            Block::Sr => v[2] = flag(v[0] != 0 || (v[1] == 0 && v[2] != 0)),
+            Block::Rs => v[2] = flag(v[1] == 0 && (v[0] != 0 || v[2] != 0)),
+            Block::Ctu => {
                 let edge = v[0] != 0 && v[count] == 0;
                 v[count] = v[0];
                 if v[1] != 0 {
                     v[4] = 0;
-                } else if edge && v[4] < 32767 {
+                } else if edge && v[4] < highest {
                     v[4] += 1;
                 }
                 v[3] = flag(v[4] >= v[2]);
             }
-            Standard::Ctd => {
+            Block::Ctd => {
                 let edge = v[0] != 0 && v[count] == 0;
                 v[count] = v[0];
                 if v[1] != 0 {
                     v[4] = v[2];
-                } else if edge && v[4] > -32768 {
+                } else if edge && v[4] > lowest {
                     v[4] -= 1;
                 }
                 v[3] = flag(v[4] <= 0);
             }
-            Standard::Ctud => {
+            Block::Ctud => {
                 let (up, down) = (v[0] != 0 && v[count] == 0, v[1] != 0 && v[count + 1] == 0);
                 (v[count], v[count + 1]) = (v[0], v[1]);
                 if v[2] != 0 {
                     v[7] = 0;
                 } else if v[3] != 0 {
                     v[7] = v[4];
-                } else if up && !down && v[7] < 32767 {
+                } else if up && !down && v[7] < highest {
                     v[7] += 1;
-                } else if down && !up && v[7] > -32768 {
+                } else if down && !up && v[7] > lowest {
                     v[7] -= 1;
                 }
                 (v[5], v[6]) = (flag(v[7] >= v[4]), flag(v[7] <= 0));
             }
-            Standard::Ton => on_delay(&mut v, now),
-            Standard::Tof => off_delay(&mut v, now),
-            Standard::Tp => pulse(&mut v, now),
+            Block::Ton => on_delay(&mut v, now),
+            Block::Tof => off_delay(&mut v, now),
+            Block::Tp => pulse(&mut v, now),
         }
         parts.iter_mut().zip(v).for_each(|(part, value)| *part = Value::Int(value));
     }

@@ -1,6 +1,6 @@
 //! A program with what happens to it: rounds, the time between them, and values that come from outside.
 
-use super::print::literal;
+use super::spelling::Style;
 use super::tree::{Class, Def, Kind, Source, Ty, Value};
 use crate::random::Random;
 
@@ -49,7 +49,7 @@ impl Case {
         let mut random = Random::new(seed ^ 0x696E_7075_7473);
         let mut places = Vec::new();
         for (number, var) in source.globals.iter().enumerate() {
-            if var.class == Class::Var && !var.gone && !var.reserved {
+            if var.class == Class::Var && !var.gone && !var.reserved && var.at.is_none() {
                 parts(&source, &var.name, var.ty, vec![number], &mut places);
             }
         }
@@ -62,7 +62,7 @@ impl Case {
                 for _ in 0..random.below(MOST_INPUTS + 1) {
                     let Some((name, ty, at)) = random.pick(&places).cloned() else { break };
                     let value = value(&source, ty, &mut random);
-                    let literal = literal(&source, ty, &value, false);
+                    let literal = Style::new(0).literal(&source, ty, &value, false);
                     next.inputs.push(Input { name, at, value, literal });
                 }
             }
@@ -128,7 +128,7 @@ fn parts(source: &Source, path: &str, ty: Ty, at: Vec<usize>, found: &mut Vec<(S
                 parts(source, &format!("{path}[{}]", indices.join(", ")), *element, next(part), found);
             }
         }
-        Def::Enum(_) | Def::Subrange(..) => found.push((path.to_string(), ty, at)),
+        Def::Enum(..) | Def::Subrange(..) => found.push((path.to_string(), ty, at)),
         // What a block remembers is its own business.
         Def::Block(_) | Def::Standard(_) => {}
     }
@@ -145,7 +145,7 @@ pub(crate) fn value(source: &Source, ty: Ty, random: &mut Random) -> Value {
             Value::Str((0..count).map(|_| random.one_of([b'a', b'A', b'0', b'7', b'-', b'$', 0xE9])).collect())
         }
         Ty::N(id) => match &source.types[id].def {
-            Def::Enum(values) => Value::Int(random.pick(values).map_or(0, |(_, value)| i128::from(*value))),
+            Def::Enum(_, values) => Value::Int(random.pick(values).map_or(0, |(_, value)| i128::from(*value))),
             Def::Subrange(_, low, high) => {
                 let span = (high - low).unsigned_abs().saturating_add(1);
                 Value::Int(low + i128::from(random.bits()).rem_euclid(i128::try_from(span).unwrap_or(i128::MAX)))

@@ -2,23 +2,32 @@
 
 use super::blocks::Standard;
 use super::generate::Generator;
-use super::tree::{Class, Def, Kind, Source, Ty, Type, UnitKind, Value, Var};
+use super::tree::{At, Class, Def, Kind, Source, Ty, Type, UnitKind, Value, Var};
 
 impl Generator {
     pub(super) fn types(&mut self) {
-        for standard in Standard::ALL {
-            self.source.types.push(Type { name: String::new(), def: Def::Standard(standard), gone: true });
+        let blocks = Standard::all();
+        for _ in 0..self.size.pick(3, 8, 12) {
+            let def = Def::Standard(*self.r.pick(&blocks).unwrap_or(&blocks[0]));
+            self.source.types.push(Type { name: String::new(), def, gone: true });
         }
-        for number in 0..self.r.between(2, 7) {
+        let (least, most) = self.size.pick((0, 2), (2, 7), (4, 10));
+        for number in 0..self.r.between(least, most) {
             let (name, def) = match self.r.below(6) {
                 0 => {
-                    let mut value = self.r.between(-3, 3);
+                    let base = if self.r.chance(40) { Some(self.r.one_of(Kind::INTEGERS)) } else { None };
+                    let (lowest, highest) = base.unwrap_or(Kind::Int).limits();
+                    let mut value = self.r.between(-3, 3).max(lowest.max(-3) as i64);
+                    if self.r.chance(20) {
+                        // Its last values are the last of the type.
+                        value = i64::try_from(highest).unwrap_or(i64::MAX) - 24;
+                    }
                     let mut values = Vec::new();
                     for member in 0..self.r.between(2, 4) {
                         values.push((format!("e{number}_{member}"), value));
                         value += self.r.between(1, 5);
                     }
-                    (format!("Enum{number}"), Def::Enum(values))
+                    (format!("Enum{number}"), Def::Enum(base, values))
                 }
                 1 => {
                     let kind = self.r.one_of(Kind::INTEGERS);
@@ -87,7 +96,7 @@ impl Generator {
             Ty::K(kind) => Some(self.number(kind)),
             Ty::S(capacity) => Some(Value::Str(self.text(usize::from(capacity)))),
             Ty::N(id) => match self.source.types[id].def.clone() {
-                Def::Enum(values) => self.r.pick(&values).map(|(_, value)| Value::Int(i128::from(*value))),
+                Def::Enum(_, values) => self.r.pick(&values).map(|(_, value)| Value::Int(i128::from(*value))),
                 Def::Subrange(_, low, high) => Some(Value::Int(if self.r.chance(50) { low } else { high })),
                 Def::Array(dims, element) => {
                     let mut parts = Vec::new();
@@ -109,11 +118,27 @@ impl Generator {
     }
 
     pub(super) fn globals(&mut self) {
-        for number in 0..self.r.between(0, 4) {
+        let (least, most) = self.size.pick((0, 2), (0, 4), (2, 8));
+        for number in 0..self.r.between(least, most) {
             let ty = self.any_type(false);
-            let init = self.init(ty, 50);
-            let var = Var { name: format!("g{number}"), ty, class: Class::Var, init, reserved: false, gone: false };
-            self.source.globals.push(var);
+            self.global(format!("g{number}"), ty);
+        }
+    }
+
+    /// A global: sometimes CONSTANT, RETAIN, or in the process image.
+    pub(super) fn global(&mut self, name: String, ty: Ty) {
+        let class = if matches!(ty, Ty::K(_)) && self.r.chance(8) { Class::Constant } else { Class::Var };
+        let at = if class == Class::Var { self.located(ty, 15) } else { None };
+        let init = if at.is_some() { None } else { self.init(ty, if class == Class::Constant { 100 } else { 50 }) };
+        let retain = class == Class::Var && at.is_none() && self.r.chance(10);
+        self.source.globals.push(Var { name, ty, class, init, reserved: false, at, retain, gone: false });
+    }
+
+    /// Sometimes an address. Floats have none, because bits from outside need be no number that the language knows.
+    fn located(&mut self, ty: Ty, percent: usize) -> Option<At> {
+        match ty {
+            Ty::K(kind) if !kind.is_real() && self.r.chance(percent) => Some(self.address(kind)),
+            _ => None,
         }
     }
 
@@ -123,8 +148,12 @@ impl Generator {
             Class::Constant => 100,
             _ => 50,
         };
-        let init = self.init(ty, percent);
-        self.unit.vars.push(Var { name, ty, class, init, reserved: false, gone: false });
+        let is_program = self.unit.kind == UnitKind::Program;
+        let at = if is_program && class == Class::Var { self.located(ty, 6) } else { None };
+        let init = if at.is_some() { None } else { self.init(ty, percent) };
+        let may_retain = self.unit.kind != UnitKind::Function && class == Class::Var && at.is_none();
+        let retain = may_retain && self.r.chance(8);
+        self.unit.vars.push(Var { name, ty, class, init, reserved: false, at, retain, gone: false });
     }
 
     /// Whether values of a type may be assigned whole.
@@ -134,7 +163,7 @@ impl Generator {
                 Def::Struct(fields) => fields.iter().all(|(_, ty, _)| self.is_copyable(*ty)),
                 // Of arrays without a name only one and the same would do.
                 Def::Array(_, element) => !self.source.types[id].name.is_empty() && self.is_copyable(*element),
-                Def::Enum(_) | Def::Subrange(..) => true,
+                Def::Enum(..) | Def::Subrange(..) => true,
                 Def::Block(_) | Def::Standard(_) => false,
             },
             _ => true,
@@ -143,7 +172,7 @@ impl Generator {
 
     /// Whether a type is no composite.
     pub(super) fn is_single(&self, ty: Ty) -> bool {
-        !matches!(self.source.plain(ty), Ty::N(id) if !matches!(self.source.types[id].def, Def::Enum(_)))
+        !matches!(self.source.plain(ty), Ty::N(id) if !matches!(self.source.types[id].def, Def::Enum(..)))
     }
 
     fn single_type(&mut self) -> Ty {
@@ -165,42 +194,54 @@ impl Generator {
 
     pub(super) fn variables(&mut self) {
         let kind = self.unit.kind;
-        if kind == UnitKind::Function {
+        if kind == UnitKind::Function && self.r.chance(88) {
             let (name, ty) = (self.unit.name.clone(), self.whole_type());
             self.declare(name, ty, Class::Return);
         }
-        let count = |generator: &mut Self, low, high| generator.r.between(low, high);
-        if kind != UnitKind::Program {
-            for number in 0..count(self, 0, 3) {
-                let ty = self.whole_type();
-                self.declare(format!("in{number}"), ty, Class::Input);
-            }
-            for number in 0..count(self, 0, 2) {
-                let ty = self.single_type();
-                self.declare(format!("out{number}"), ty, Class::Output);
-            }
-            for number in 0..count(self, 0, 2) {
-                let global = self.r.pick(&self.source.globals).map(|var| var.ty);
-                let ty = global.filter(|_| self.r.chance(50)).unwrap_or_else(|| self.any_type(false));
-                if self.is_copyable(ty) {
-                    self.declare(format!("io{number}"), ty, Class::InOut);
-                }
-            }
+        // What runs at startup takes nothing.
+        let takes = if kind == UnitKind::Program { self.configured } else { self.unit.name != "start" };
+        if takes {
+            self.parameters(kind);
         }
-        let (low, high) = if kind == UnitKind::Program { (6, 14) } else { (1, 4) };
-        for number in 0..count(self, low, high) {
+        let (low, high) = if kind == UnitKind::Program {
+            self.size.pick((3, 6), (6, 14), (10, 24))
+        } else {
+            self.size.pick((0, 3), (1, 4), (2, 6))
+        };
+        for number in 0..self.r.between(low, high) {
             let ty = if kind == UnitKind::Function { self.single_type() } else { self.any_type(false) };
             self.declare(format!("v{number}"), ty, Class::Var);
         }
         if kind != UnitKind::Function {
-            for number in 0..count(self, 0, 2) {
+            for number in 0..self.r.between(0, 2) {
                 let ty = self.single_type();
                 self.declare(format!("t{number}"), ty, Class::Temp);
             }
         }
-        for number in 0..count(self, 0, 2) {
+        for number in 0..self.r.between(0, 2) {
             let ty = Ty::K(self.kind());
             self.declare(format!("c{number}"), ty, Class::Constant);
+        }
+    }
+
+    fn parameters(&mut self, kind: UnitKind) {
+        let is_program = kind == UnitKind::Program;
+        for number in 0..self.r.between(0, 3) {
+            let ty = if is_program { self.single_type() } else { self.whole_type() };
+            self.declare(format!("in{number}"), ty, Class::Input);
+        }
+        for number in 0..self.r.between(0, 2) {
+            let ty = self.single_type();
+            self.declare(format!("out{number}"), ty, Class::Output);
+        }
+        let most = if is_program { 1 } else { 2 };
+        for number in 0..self.r.between(0, most) {
+            let global = self.r.pick(&self.source.globals).filter(|var| var.class == Class::Var).map(|var| var.ty);
+            let wanted = global.filter(|_| is_program || self.r.chance(50));
+            let ty = if is_program { wanted } else { wanted.or_else(|| Some(self.any_type(false))) };
+            if let Some(ty) = ty {
+                self.declare(format!("io{number}"), ty, Class::InOut);
+            }
         }
     }
 }

@@ -4,7 +4,10 @@ use std::collections::BTreeMap;
 
 use khz_bytecode::trap::TrapCode;
 
-use super::functions::{binary, complement, convert, negate, number_in, standard};
+use super::functions::{binary, complement, convert, negate, standard};
+use super::memory::{Memory, Ref};
+use super::position::Key;
+use super::text;
 use super::tree::{Arg, Base, Class, Def, Expr, ExprKind, Kind, Op, Place, Source, Step, Stmt, Ty, Value};
 
 /// Why a scan did not come to its end.
@@ -16,12 +19,6 @@ pub enum Stop {
     TooLong,
 }
 
-impl From<TrapCode> for Stop {
-    fn from(code: TrapCode) -> Stop {
-        Stop::Trap(code, [0; 3])
-    }
-}
-
 /// How a list of statements ended.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Flow {
@@ -31,13 +28,6 @@ enum Flow {
     Return,
 }
 
-/// A variable or a part of one: frame, then parts of composites.
-#[derive(Debug, Clone)]
-struct Ref {
-    frame: usize,
-    path: Vec<usize>,
-}
-
 /// One activation of a unit.
 struct Context {
     unit: usize,
@@ -45,53 +35,126 @@ struct Context {
     in_outs: BTreeMap<usize, Ref>,
 }
 
-/// A running program. Frame 0 are the globals, frame 1 the program, the others calls of functions.
+/// A running program. Frame 0 are the globals, then come the program instances, the others are calls of functions.
+#[derive(Debug)]
 pub struct Evaluator<'s> {
     source: &'s Source,
-    frames: Vec<Value>,
+    memory: Memory,
+    instances: usize,
     now: i128,
     steps: u64,
     limit: u64,
+    /// The calls that are under way.
+    calls: Vec<Key>,
+    trapped_at: Vec<Key>,
 }
-
-const PROGRAM: usize = 1;
 
 impl<'s> Evaluator<'s> {
     /// A program before its first scan; `limit` bounds the steps of each.
     #[must_use]
     pub fn new(source: &'s Source, limit: u64) -> Self {
         let globals = source.globals.iter().map(|var| source.first(var)).collect();
-        let program = source.instance(source.units.len() - 1);
-        Evaluator { source, frames: vec![Value::Many(globals), program], now: 0, steps: 0, limit }
+        let mut frames = vec![Value::Many(globals)];
+        frames.extend(source.programs().iter().map(|(_, unit, _)| source.instance(*unit)));
+        let instances = frames.len() - 1;
+        let memory = Memory::new(frames);
+        Evaluator { source, memory, instances, now: 0, steps: 0, limit, calls: Vec::new(), trapped_at: Vec::new() }
     }
 
-    /// Runs the program once, at a time of the round in nanoseconds.
+    /// Runs every program instance once in the order of declaration, at a time of the round in nanoseconds.
     ///
     /// # Errors
     /// A trap, or too many steps; what was stored before stays.
     pub fn scan(&mut self, now: i64) -> Result<(), Stop> {
+        (0..self.instances).try_for_each(|instance| self.run_instance(instance, now))
+    }
+
+    /// Runs one program instance: its inputs are connected, its body runs, its outputs are stored.
+    ///
+    /// # Errors
+    /// As [`Evaluator::scan`].
+    pub fn run_instance(&mut self, instance: usize, now: i64) -> Result<(), Stop> {
         (self.now, self.steps) = (i128::from(now), 0);
-        let unit = self.source.units.len() - 1;
-        let me = Ref { frame: PROGRAM, path: Vec::new() };
+        self.calls.clear();
+        let Some((_, unit, args)) = self.source.programs().get(instance).copied() else { return Ok(()) };
+        let me = Ref::frame(instance + 1);
+        // Connections stand outside of any unit: their places are globals.
+        let outside = Context { unit, me: me.clone(), in_outs: BTreeMap::new() };
+        let mut in_outs = BTreeMap::new();
+        self.inputs(&outside, &me, unit, args, &mut in_outs)?;
+        let result = self.body(&Context { unit, me: me.clone(), in_outs });
+        self.memory.frames.truncate(self.instances + 1);
+        result?;
+        self.outputs(&outside, &me, unit, args)
+    }
+
+    /// Runs the startup function, if there is one.
+    ///
+    /// # Errors
+    /// As [`Evaluator::scan`].
+    pub fn start(&mut self) -> Result<(), Stop> {
+        let Some(unit) = self.source.config.as_ref().and_then(|config| config.startup) else { return Ok(()) };
+        (self.now, self.steps) = (0, 0);
+        self.memory.frames.push(self.source.instance(unit));
+        let me = Ref::frame(self.memory.frames.len() - 1);
         let result = self.body(&Context { unit, me, in_outs: BTreeMap::new() });
-        self.frames.truncate(PROGRAM + 1);
+        self.memory.frames.truncate(self.instances + 1);
         result
+    }
+
+    /// The input bytes of the process image, to be set before a scan.
+    pub fn input_bytes(&mut self) -> &mut [u8] {
+        &mut self.memory.image[0]
+    }
+
+    /// The output bytes and the marker bytes of the process image.
+    #[must_use]
+    pub fn image_bytes(&self) -> (&[u8], &[u8]) {
+        (&self.memory.image[1], &self.memory.image[2])
+    }
+
+    /// A global variable's value as a BOOL.
+    #[must_use]
+    pub fn global_flag(&self, global: usize) -> bool {
+        matches!(&self.memory.frames[0], Value::Many(parts) if parts[global] == Value::Int(1))
+    }
+
+    /// Where the last trap happened, then the calls that led there, innermost first.
+    #[must_use]
+    pub fn trapped_at(&self) -> &[Key] {
+        &self.trapped_at
     }
 
     /// Every variable that lives between scans: path in a dump, type, value.
     #[must_use]
     pub fn variables(&self) -> Vec<(String, Ty, Value)> {
         let mut found = Vec::new();
-        if let Value::Many(parts) = &self.frames[0] {
-            for (var, part) in self.source.globals.iter().zip(parts).filter(|(var, _)| !var.gone) {
+        if let Value::Many(parts) = &self.memory.frames[0] {
+            let shown = self.source.globals.iter().zip(parts).filter(|(var, _)| !var.gone && var.at.is_none());
+            for (var, part) in shown {
                 self.source.leaves(&var.name, var.ty, part, &mut found);
             }
         }
-        let last = self.source.units.len() - 1;
-        if let Value::Many(parts) = &self.frames[PROGRAM] {
-            self.source.unit_leaves(&self.source.units[last].name, last, parts, &mut found);
+        for ((name, unit, _), frame) in self.source.programs().into_iter().zip(&self.memory.frames[1..]) {
+            if let Value::Many(parts) = frame {
+                self.source.unit_leaves(name, unit, parts, &mut found);
+            }
         }
         found
+    }
+
+    /// The values alone, in the order of [`Evaluator::variables`].
+    pub fn values<'v>(&'v self, found: &mut Vec<&'v Value>) {
+        found.clear();
+        if let Value::Many(parts) = &self.memory.frames[0] {
+            let shown = self.source.globals.iter().zip(parts).filter(|(var, _)| !var.gone && var.at.is_none());
+            shown.for_each(|(var, part)| self.source.leaf_values(var.ty, part, found));
+        }
+        for ((_, unit, _), frame) in self.source.programs().into_iter().zip(&self.memory.frames[1..]) {
+            if let Value::Many(parts) = frame {
+                self.source.unit_leaf_values(unit, parts, found);
+            }
+        }
     }
 
     fn step(&mut self) -> Result<(), Stop> {
@@ -99,57 +162,65 @@ impl<'s> Evaluator<'s> {
         if self.steps > self.limit { Err(Stop::TooLong) } else { Ok(()) }
     }
 
+    fn trap(&mut self, at: Key, code: TrapCode, values: [i64; 3]) -> Stop {
+        self.trapped_at = std::iter::once(at).chain(self.calls.iter().rev().copied()).collect();
+        Stop::Trap(code, values)
+    }
+
     /// Runs a unit's statements with fresh VAR_TEMP.
     fn body(&mut self, context: &Context) -> Result<(), Stop> {
         let unit = &self.source.units[context.unit];
         for (at, var) in unit.vars.iter().enumerate().filter(|(_, var)| var.class == Class::Temp) {
             let first = self.source.first(var);
-            *self.at(&child(&context.me, at)) = first;
+            self.memory.write(&context.me.child(at), first);
         }
         self.list(context, &unit.body).map(|_| ())
     }
 
-    fn at(&mut self, place: &Ref) -> &mut Value {
-        place.path.iter().fold(&mut self.frames[place.frame], |value, step| match value {
-            Value::Many(parts) => &mut parts[*step],
-            other => panic!("{other:?} has no parts"),
-        })
+    /// The variable at the beginning of a place, and its type.
+    fn base(&self, context: &Context, place: &Place) -> (Ref, Ty) {
+        let kind = |ty: Ty| if let Ty::K(kind) = self.source.plain(ty) { kind } else { Kind::Lint };
+        match place.base {
+            Base::Direct(at) => (Ref::image(at, kind(place.ty)), place.ty),
+            Base::Global(number) => {
+                let var = &self.source.globals[number];
+                let found = var.at.map_or_else(|| Ref::frame(0).child(number), |at| Ref::image(at, kind(var.ty)));
+                (found, var.ty)
+            }
+            Base::Var(number) => {
+                let var = &self.source.units[context.unit].vars[number];
+                let own = || var.at.map_or_else(|| context.me.child(number), |at| Ref::image(at, kind(var.ty)));
+                (context.in_outs.get(&number).cloned().unwrap_or_else(own), var.ty)
+            }
+        }
     }
 
-    /// Follows a place; indices are evaluated and checked from left to right.
+    /// Follows a place; indices are evaluated from left to right, then checked.
     fn place(&mut self, context: &Context, place: &Place) -> Result<Ref, Stop> {
-        let (mut found, mut ty) = match place.base {
-            Base::Global(at) => (Ref { frame: 0, path: vec![at] }, self.source.globals[at].ty),
-            Base::Var(at) => {
-                let ty = self.source.units[context.unit].vars[at].ty;
-                (context.in_outs.get(&at).cloned().unwrap_or_else(|| child(&context.me, at)), ty)
-            }
-        };
+        let (mut found, mut ty) = self.base(context, place);
         let source = self.source;
         for step in &place.steps {
+            if let (Step::Part(first, count), Ty::K(kind)) = (step, source.plain(ty)) {
+                found.part = Some((*first, *count, kind));
+                break;
+            }
             let Ty::N(id) = ty else { panic!("a step into {ty:?}") };
             match (step, &source.types[id].def) {
-                (Step::Field(at), Def::Struct(fields)) => {
-                    ty = fields[*at].1;
-                    found.path.push(*at);
-                }
-                (Step::Field(at), Def::Block(unit)) => {
-                    ty = source.units[*unit].vars[*at].ty;
-                    found.path.push(*at);
-                }
-                (Step::Field(at), Def::Standard(standard)) => {
-                    ty = Ty::K(standard.fields()[*at].1);
+                (Step::Field(at), def) => {
+                    ty = source.field_type(def, *at);
                     found.path.push(*at);
                 }
                 (Step::Index(indices), Def::Array(dims, element)) => {
+                    let values =
+                        indices.iter().map(|index| self.expr(context, index)).collect::<Result<Vec<_>, _>>()?;
                     let mut position = 0;
-                    for (index, (low, high)) in indices.iter().zip(dims) {
-                        let value = self.expr(context, index)?.int();
+                    for (value, (low, high)) in values.iter().map(Value::int).zip(dims) {
                         let (low, high) = (i128::from(*low), i128::from(*high));
                         if !(low..=high).contains(&value) {
                             // Bounds are DINT, and a trap shows an index as the nearest DINT.
                             let shown = value.clamp(i128::from(i32::MIN), i128::from(i32::MAX)) as i64;
-                            return Err(Stop::Trap(TrapCode::ArrayIndex, [shown, low as i64, high as i64]));
+                            let values = [shown, low as i64, high as i64];
+                            return Err(self.trap(Key::of_place(place), TrapCode::ArrayIndex, values));
                         }
                         position = position * (high - low + 1) + value - low;
                     }
@@ -162,18 +233,18 @@ impl<'s> Evaluator<'s> {
         Ok(found)
     }
 
-    /// Stores a value: strings are cut, subranges checked.
-    fn store(&mut self, place: &Ref, ty: Ty, mut value: Value) -> Result<(), Stop> {
+    /// Stores a value: strings are cut, subranges checked. `from` is where the value stands in the program.
+    fn store(&mut self, place: &Ref, ty: Ty, mut value: Value, from: Key) -> Result<(), Stop> {
         if let Ty::N(id) = ty
             && let Def::Subrange(_, low, high) = &self.source.types[id].def
             && !(*low..=*high).contains(&value.int())
         {
-            return Err(Stop::Trap(TrapCode::Range, [value.int() as i64, *low as i64, *high as i64]));
+            return Err(self.trap(from, TrapCode::Range, [value.int() as i64, *low as i64, *high as i64]));
         }
         if let (Ty::S(capacity), Value::Str(bytes)) = (ty, &mut value) {
             bytes.truncate(usize::from(capacity));
         }
-        *self.at(place) = value;
+        self.memory.write(place, value);
         Ok(())
     }
 
@@ -184,7 +255,7 @@ impl<'s> Evaluator<'s> {
             ExprKind::Lit(value, _) => value.clone(),
             ExprKind::Get(place) => {
                 let found = self.place(context, place)?;
-                self.at(&found).clone()
+                self.memory.read(&found)
             }
             ExprKind::Bin(op, left, right) => {
                 let a = self.expr(context, left)?;
@@ -194,101 +265,159 @@ impl<'s> Evaluator<'s> {
                     _ => {}
                 }
                 let b = self.expr(context, right)?;
-                binary(*op, kind(left.ty), &a, &b)?
+                let wraps = if kind(expr.ty).is_duration() { expr.ty } else { left.ty };
+                binary(*op, kind(wraps), &a, &b).map_err(|code| self.trap(Key::of_expr(expr), code, [0; 3]))?
             }
             ExprKind::Neg(inner) => negate(kind(inner.ty), &self.expr(context, inner)?),
             ExprKind::Not(inner) => complement(kind(inner.ty), &self.expr(context, inner)?),
             ExprKind::Widen(inner) | ExprKind::Conv(inner) | ExprKind::Trunc(inner) => {
                 let value = self.expr(context, inner)?;
                 match (inner.ty, expr.ty) {
-                    (Ty::S(_), Ty::K(to)) => number_in(to, value.bytes()),
-                    (_, Ty::S(_)) => Value::Str(value.int().to_string().into_bytes()),
+                    (Ty::S(_), Ty::K(to)) => text::read(to, value.bytes()),
+                    (from, Ty::S(capacity)) => {
+                        let mut text = text::write(kind(from), &value);
+                        text.truncate(usize::from(capacity));
+                        Value::Str(text)
+                    }
                     (from, to) => convert(kind(from), kind(to), &value, matches!(expr.kind, ExprKind::Trunc(_))),
                 }
             }
             ExprKind::Std(function, inputs) => {
                 let values = inputs.iter().map(|input| self.expr(context, input)).collect::<Result<Vec<_>, _>>()?;
-                standard(*function, kind(expr.ty), &values)
+                let found = standard(*function, kind(expr.ty), &values);
+                let found = found.map_err(|code| self.trap(Key::of_expr(expr), code, [0; 3]))?;
+                found.unwrap_or_else(|| panic!("{function:?} has no meaning here"))
             }
-            ExprKind::Call(unit, args) => self.call_function(context, *unit, args)?,
+            ExprKind::Call(unit, args) => {
+                if !self.is_enabled(context, args)? {
+                    // It gives nothing: zero.
+                    return Ok(self.source.initial(expr.ty));
+                }
+                self.call_function(context, *unit, args, Key::of_expr(expr))?
+            }
         })
     }
 
-    fn call_function(&mut self, context: &Context, unit: usize, args: &[Arg]) -> Result<Value, Stop> {
-        let source = self.source;
-        let mut locals = source.instance(unit);
-        let mut in_outs = BTreeMap::new();
+    /// Evaluates EN; where it is FALSE, ENO is too.
+    fn is_enabled(&mut self, context: &Context, args: &[Arg]) -> Result<bool, Stop> {
+        let mut enabled = true;
         for arg in args {
-            match arg {
-                Arg::In(at, value) => {
-                    let mut value = self.expr(context, value)?;
-                    if let (Ty::S(capacity), Value::Str(bytes)) = (source.units[unit].vars[*at].ty, &mut value) {
-                        bytes.truncate(usize::from(capacity));
-                    }
-                    if let Value::Many(parts) = &mut locals {
-                        parts[*at] = value;
-                    }
-                }
-                Arg::InOut(at, place) => {
-                    let found = self.place(context, place)?;
-                    in_outs.insert(*at, found);
-                }
-                Arg::Out(..) => {}
+            if let Arg::En(condition) = arg {
+                enabled = self.expr(context, condition)?.int() != 0;
             }
         }
-        self.frames.push(locals);
-        let frame = self.frames.len() - 1;
-        let me = Ref { frame, path: Vec::new() };
-        self.body(&Context { unit, me: me.clone(), in_outs })?;
-        self.outputs(context, &me, args)?;
-        let Some(Value::Many(parts)) = self.frames.pop() else { panic!("no frame") };
-        Ok(parts.into_iter().next().unwrap_or(Value::Int(0)))
+        if !enabled {
+            self.eno(context, args, 0)?;
+        }
+        Ok(enabled)
     }
 
-    fn outputs(&mut self, context: &Context, me: &Ref, args: &[Arg]) -> Result<(), Stop> {
+    fn eno(&mut self, context: &Context, args: &[Arg], value: i128) -> Result<(), Stop> {
         for arg in args {
-            if let Arg::Out(at, place) = arg {
-                let value = self.at(&child(me, *at)).clone();
+            if let Arg::Eno(place) = arg {
                 let target = self.place(context, place)?;
-                self.store(&target, place.ty, value)?;
+                self.memory.write(&target, Value::Int(value));
             }
         }
         Ok(())
     }
 
-    fn call_block(&mut self, context: &Context, place: &Place, args: &[Arg]) -> Result<(), Stop> {
-        let me = self.place(context, place)?;
+    /// Stores what is given to a unit's inputs; finds what its VAR_IN_OUT stand for.
+    fn inputs(
+        &mut self,
+        context: &Context,
+        me: &Ref,
+        unit: usize,
+        args: &[Arg],
+        in_outs: &mut BTreeMap<usize, Ref>,
+    ) -> Result<(), Stop> {
         let source = self.source;
-        let Ty::N(id) = place.ty else { panic!("a call of {place:?}") };
-        let mut in_outs = BTreeMap::new();
         for arg in args {
             match arg {
-                Arg::In(at, value) => {
-                    let value = self.expr(context, value)?;
-                    let ty = match &source.types[id].def {
-                        Def::Block(unit) => source.units[*unit].vars[*at].ty,
-                        _ => value_ty(&value),
-                    };
-                    self.store(&child(&me, *at), ty, value)?;
+                Arg::In(at, given) => {
+                    let value = self.expr(context, given)?;
+                    self.store(&me.child(*at), source.units[unit].vars[*at].ty, value, Key::of_expr(given))?;
                 }
                 Arg::InOut(at, place) => {
                     let found = self.place(context, place)?;
                     in_outs.insert(*at, found);
                 }
-                Arg::Out(..) => {}
+                Arg::Out(..) | Arg::En(_) | Arg::Eno(_) => {}
             }
         }
+        Ok(())
+    }
+
+    fn call_function(&mut self, context: &Context, unit: usize, args: &[Arg], at: Key) -> Result<Value, Stop> {
+        let source = self.source;
+        // Its frame is there from the start, but what it is given is evaluated in the caller's.
+        self.memory.frames.push(source.instance(unit));
+        let me = Ref::frame(self.memory.frames.len() - 1);
+        let mut in_outs = BTreeMap::new();
+        self.inputs(context, &me, unit, args, &mut in_outs)?;
+        self.calls.push(at);
+        self.body(&Context { unit, me: me.clone(), in_outs })?;
+        self.calls.pop();
+        self.outputs(context, &me, unit, args)?;
+        self.eno(context, args, 1)?;
+        let Some(Value::Many(parts)) = self.memory.frames.pop() else { panic!("no frame") };
+        Ok(parts.into_iter().next().unwrap_or(Value::Int(0)))
+    }
+
+    fn outputs(&mut self, context: &Context, me: &Ref, unit: usize, args: &[Arg]) -> Result<(), Stop> {
+        let source = self.source;
+        for arg in args {
+            if let Arg::Out(at, place) = arg {
+                let value = self.memory.read(&me.child(*at));
+                let value = match (source.plain(source.units[unit].vars[*at].ty), source.plain(place.ty)) {
+                    (Ty::K(from), Ty::K(to)) => convert(from, to, &value, false),
+                    _ => value,
+                };
+                let target = self.place(context, place)?;
+                self.store(&target, place.ty, value, Key::of_place(place))?;
+            }
+        }
+        Ok(())
+    }
+
+    fn call_block(&mut self, context: &Context, place: &Place, args: &[Arg], at: Key) -> Result<(), Stop> {
+        if !self.is_enabled(context, args)? {
+            return Ok(());
+        }
+        let me = self.place(context, place)?;
+        let source = self.source;
+        let Ty::N(id) = place.ty else { panic!("a call of {place:?}") };
         match &source.types[id].def {
-            Def::Block(unit) => self.body(&Context { unit: *unit, me: me.clone(), in_outs })?,
+            Def::Block(unit) => {
+                let mut in_outs = BTreeMap::new();
+                self.inputs(context, &me, *unit, args, &mut in_outs)?;
+                self.calls.push(at);
+                self.body(&Context { unit: *unit, me: me.clone(), in_outs })?;
+                self.calls.pop();
+                self.outputs(context, &me, *unit, args)?;
+            }
             Def::Standard(standard) => {
+                for arg in args {
+                    if let Arg::In(at, given) = arg {
+                        let value = self.expr(context, given)?;
+                        self.memory.write(&me.child(*at), value);
+                    }
+                }
                 let now = self.now;
-                if let Value::Many(parts) = self.at(&me) {
+                if let Value::Many(parts) = self.memory.at(&me) {
                     standard.call(parts, now);
+                }
+                for arg in args {
+                    if let Arg::Out(at, place) = arg {
+                        let value = self.memory.read(&me.child(*at));
+                        let target = self.place(context, place)?;
+                        self.store(&target, place.ty, value, Key::of_place(place))?;
+                    }
                 }
             }
             other => panic!("a call of {other:?}"),
         }
-        self.outputs(context, &me, args)
+        self.eno(context, args, 1)
     }
 
     fn list(&mut self, context: &Context, list: &[Stmt]) -> Result<Flow, Stop> {
@@ -302,13 +431,36 @@ impl<'s> Evaluator<'s> {
         Ok(Flow::Next)
     }
 
+    fn assign(&mut self, context: &Context, place: &Place, value: &Expr) -> Result<(), Stop> {
+        // A call that is not enabled gives nothing to assign; a conversion around it changes nothing of that.
+        let mut call = value;
+        while let ExprKind::Widen(inner) = &call.kind {
+            call = inner;
+        }
+        let found = match &call.kind {
+            ExprKind::Call(unit, args) if args.iter().any(|arg| matches!(arg, Arg::En(_))) => {
+                if !self.is_enabled(context, args)? {
+                    return Ok(());
+                }
+                let found = self.call_function(context, *unit, args, Key::of_expr(call))?;
+                match (self.source.plain(call.ty), value.ty) {
+                    (Ty::K(from), Ty::K(to)) => convert(from, to, &found, false),
+                    _ => found,
+                }
+            }
+            _ => {
+                let target = self.place(context, place)?;
+                let found = self.expr(context, value)?;
+                return self.store(&target, place.ty, found, Key::of_expr(value));
+            }
+        };
+        let target = self.place(context, place)?;
+        self.store(&target, place.ty, found, Key::of_expr(value))
+    }
+
     fn stmt(&mut self, context: &Context, stmt: &Stmt) -> Result<Flow, Stop> {
         match stmt {
-            Stmt::Assign(place, value) => {
-                let target = self.place(context, place)?;
-                let value = self.expr(context, value)?;
-                self.store(&target, place.ty, value)?;
-            }
+            Stmt::Assign(place, value) => self.assign(context, place, value)?,
             Stmt::If(branches, otherwise) => {
                 for (condition, body) in branches {
                     if self.expr(context, condition)?.int() != 0 {
@@ -325,7 +477,7 @@ impl<'s> Evaluator<'s> {
                 return self.list(context, chosen.map_or(otherwise, |(_, body)| body));
             }
             Stmt::For(control, from, to, by, body) => {
-                return self.for_loop(context, *control, (from, to, by.as_ref()), body);
+                return self.for_loop(context, stmt, *control, (from, to, by.as_ref()), body);
             }
             Stmt::While(counter, limit, condition, body) => {
                 self.count(context, *counter, 0);
@@ -357,7 +509,12 @@ impl<'s> Evaluator<'s> {
                     }
                 }
             }
-            Stmt::Call(place, args) => self.call_block(context, place, args)?,
+            Stmt::Call(place, args) => self.call_block(context, place, args, Key::of_stmt(stmt))?,
+            Stmt::Do(unit, args) => {
+                if self.is_enabled(context, args)? {
+                    self.call_function(context, *unit, args, Key::of_stmt(stmt))?;
+                }
+            }
             Stmt::Exit => return Ok(Flow::Exit),
             Stmt::Continue => return Ok(Flow::Continue),
             Stmt::Return => return Ok(Flow::Return),
@@ -366,16 +523,17 @@ impl<'s> Evaluator<'s> {
     }
 
     fn count(&mut self, context: &Context, counter: usize, value: i128) {
-        *self.at(&child(&context.me, counter)) = Value::Int(value);
+        self.memory.write(&context.me.child(counter), Value::Int(value));
     }
 
     fn counted(&mut self, context: &Context, counter: usize) -> i128 {
-        self.at(&child(&context.me, counter)).int()
+        self.memory.read(&context.me.child(counter)).int()
     }
 
     fn for_loop(
         &mut self,
         context: &Context,
+        stmt: &Stmt,
         control: usize,
         (from, to, by): (&Expr, &Expr, Option<&Expr>),
         body: &[Stmt],
@@ -385,7 +543,7 @@ impl<'s> Evaluator<'s> {
         let bound = self.expr(context, to)?.int();
         let step = by.map_or(Ok(1), |by| self.expr(context, by).map(|value| value.int()))?;
         if step == 0 {
-            return Err(Stop::Trap(TrapCode::Range, [0; 3]));
+            return Err(self.trap(Key::of_stmt(stmt), TrapCode::Range, [0; 3]));
         }
         self.count(context, control, value);
         while if step > 0 { value <= bound } else { value >= bound } {
@@ -402,19 +560,5 @@ impl<'s> Evaluator<'s> {
             self.count(context, control, kind.wrap(value));
         }
         Ok(Flow::Next)
-    }
-}
-
-fn child(place: &Ref, part: usize) -> Ref {
-    let mut path = place.path.clone();
-    path.push(part);
-    Ref { frame: place.frame, path }
-}
-
-/// A type that stores a value of a standard block's input as it is.
-fn value_ty(value: &Value) -> Ty {
-    match value {
-        Value::Int(_) => Ty::K(Kind::Lint),
-        other => panic!("{other:?} is no input of a standard block"),
     }
 }

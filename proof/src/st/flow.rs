@@ -45,6 +45,7 @@ impl Flow<'_> {
         match place.base {
             Base::Var(at) => format!("{}.{}", unit.name, unit.vars[at].name),
             Base::Global(at) => self.source.globals[at].name.clone(),
+            Base::Direct(at) => format!("{at:?}"),
         }
     }
 
@@ -64,7 +65,7 @@ impl Flow<'_> {
         for (callee, args) in calls {
             let callee = &self.source.units[callee];
             self.args(unit, callee, args);
-            read.insert(format!("{}.{}", callee.name, callee.vars[0].name));
+            read.extend(callee.vars.first().map(|var| format!("{}.{}", callee.name, var.name)));
         }
         read
     }
@@ -83,6 +84,15 @@ impl Flow<'_> {
                     if matches!(arg, Arg::InOut(..)) {
                         self.flows(&parameter(*at), [name]);
                     }
+                }
+                Arg::En(value) => {
+                    let read = self.reads(unit, |see| each_in_expr(value, see));
+                    let vars = callee.vars.iter().map(|var| format!("{}.{}", callee.name, var.name));
+                    vars.for_each(|name| self.flows(&name, read.iter().cloned()));
+                }
+                Arg::Eno(place) => {
+                    let name = self.name(unit, place);
+                    self.flows(&name, callee.vars.iter().map(|var| format!("{}.{}", callee.name, var.name)));
                 }
             }
         }
@@ -118,6 +128,7 @@ impl Flow<'_> {
                     self.flows(&name, inner.iter().cloned());
                 }
                 Stmt::Call(place, args) => self.block(unit, place, args, conditions),
+                Stmt::Do(callee, args) => self.args(unit, &self.source.units[*callee], args),
                 Stmt::Exit | Stmt::Continue | Stmt::Return => {}
             }
             bodies(stmt).into_iter().for_each(|body| self.list(unit, body, &inner));
@@ -143,11 +154,11 @@ impl Flow<'_> {
         }
         for arg in args {
             match arg {
-                Arg::In(_, value) => {
+                Arg::In(_, value) | Arg::En(value) => {
                     let read = self.reads(unit, |see| each_in_expr(value, see));
                     self.flows(&instance, read);
                 }
-                Arg::InOut(_, target) | Arg::Out(_, target) => {
+                Arg::InOut(_, target) | Arg::Out(_, target) | Arg::Eno(target) => {
                     let name = self.name(unit, target);
                     self.flows(&name, [instance.clone()]);
                 }

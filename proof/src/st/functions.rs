@@ -1,48 +1,18 @@
 //! Operators, conversions and standard functions over values.
 
 use khz_bytecode::trap::TrapCode;
+pub use khz_machine::library::functions::StandardFunction as Function;
+use khz_machine::library::functions::{FunctionRow, TABLE};
 
 use super::tree::{Kind, Op, Value};
 
-/// Standard functions that the generator uses.
-#[allow(missing_docs, reason = "the names are the standard's")]
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Function {
-    Abs,
-    Sqrt,
-    Min,
-    Max,
-    Limit,
-    Sel,
-    Mux,
-    Shl,
-    Shr,
-    Rol,
-    Ror,
-    Add,
-    Mul,
-    Move,
-    Len,
-    Left,
-    Right,
-    Mid,
-    Concat,
-    Insert,
-    Delete,
-    Replace,
-    Find,
-}
-
-impl Function {
-    /// Its name.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        const NAMES: [&str; 23] = [
-            "ABS", "SQRT", "MIN", "MAX", "LIMIT", "SEL", "MUX", "SHL", "SHR", "ROL", "ROR", "ADD", "MUL", "MOVE",
-            "LEN", "LEFT", "RIGHT", "MID", "CONCAT", "INSERT", "DELETE", "REPLACE", "FIND",
-        ];
-        NAMES[self as usize]
-    }
+/// The row of a function in the table of the library, which says how it is called and what it takes.
+///
+/// # Panics
+/// Never: every function has a row.
+#[must_use]
+pub fn row(function: Function) -> &'static FunctionRow {
+    TABLE.iter().find(|row| row.function == function).expect("every function has a row")
 }
 
 fn less(a: &Value, b: &Value) -> bool {
@@ -55,12 +25,28 @@ fn less(a: &Value, b: &Value) -> bool {
     }
 }
 
-fn equal(a: &Value, b: &Value) -> bool {
+fn power(a: &Value, b: &Value) -> Value {
     match (a, b) {
-        (Value::Real(a), Value::Real(b)) => a == b,
-        (Value::Lreal(a), Value::Lreal(b)) => a == b,
-        _ => a == b,
+        (Value::Real(a), Value::Real(b)) => Value::Real(libm::powf(*a, *b)),
+        (Value::Lreal(a), Value::Lreal(b)) => Value::Lreal(libm::pow(*a, *b)),
+        _ => panic!("{a:?} to the power of {b:?}"),
     }
+}
+
+/// A comparison.
+///
+/// # Panics
+/// When the tree is wrong.
+fn compare(op: Op, a: &Value, b: &Value) -> Option<bool> {
+    Some(match op {
+        Op::Eq => a == b,
+        Op::Ne => a != b,
+        Op::Lt => less(a, b),
+        Op::Gt => less(b, a),
+        Op::Le => less(a, b) || a == b,
+        Op::Ge => less(b, a) || a == b,
+        _ => return None,
+    })
 }
 
 /// A binary operation whose operands are of one type, of which integers wrap in `kind`.
@@ -71,15 +57,8 @@ fn equal(a: &Value, b: &Value) -> bool {
 /// # Panics
 /// When the tree is wrong.
 pub fn binary(op: Op, kind: Kind, a: &Value, b: &Value) -> Result<Value, TrapCode> {
-    let flag = |value: bool| Ok(Value::Int(i128::from(value)));
-    match op {
-        Op::Eq => return flag(equal(a, b)),
-        Op::Ne => return flag(!equal(a, b)),
-        Op::Lt => return flag(less(a, b)),
-        Op::Gt => return flag(less(b, a)),
-        Op::Le => return flag(less(a, b) || equal(a, b)),
-        Op::Ge => return flag(less(b, a) || equal(a, b)),
-        _ => {}
+    if let Some(flag) = compare(op, a, b) {
+        return Ok(Value::Int(i128::from(flag)));
     }
     macro_rules! float {
         ($wrap:path, $a:expr, $b:expr) => {
@@ -93,6 +72,15 @@ pub fn binary(op: Op, kind: Kind, a: &Value, b: &Value) -> Result<Value, TrapCod
         };
     }
     match (a, b) {
+        _ if op == Op::Pow => Ok(power(a, b)),
+        // A duration times or by a float: in LREAL, then to the nearest nanosecond.
+        (Value::Int(_), Value::Lreal(factor)) => {
+            let time = a.int() as f64;
+            Ok(saturate(kind, if op == Op::Mul { time * factor } else { time / factor }.round_ties_even()))
+        }
+        (Value::Lreal(factor), Value::Int(_)) if op == Op::Mul => {
+            Ok(saturate(kind, (factor * b.int() as f64).round_ties_even()))
+        }
         (Value::Real(a), Value::Real(b)) => float!(Value::Real, a, b),
         (Value::Lreal(a), Value::Lreal(b)) => float!(Value::Lreal, a, b),
         _ => {
@@ -155,6 +143,15 @@ pub fn convert(from: Kind, to: Kind, value: &Value, cut: bool) -> Value {
         Value::Lreal(value) => Some(*value),
         _ => None,
     };
+    if from.is_duration() != to.is_duration() && to != Kind::Bool {
+        // TIME meets numbers in milliseconds, LTIME in nanoseconds, both as a LINT.
+        if from.is_duration() {
+            let whole = if from == Kind::Time { value.int() / MILLISECOND } else { value.int() };
+            return convert(Kind::Lint, to, &Value::Int(whole), cut);
+        }
+        let whole = convert(from, Kind::Lint, value, cut).int();
+        return Value::Int(to.wrap(if to == Kind::Time { whole.wrapping_mul(MILLISECOND) } else { whole }));
+    }
     match (float, to) {
         (Some(value), Kind::Bool) => Value::Int(i128::from(value != 0.0)),
         (Some(value), Kind::Real) => Value::Real(value as f32),
@@ -164,23 +161,8 @@ pub fn convert(from: Kind, to: Kind, value: &Value, cut: bool) -> Value {
         (None, Kind::Real) => Value::Real(value.int() as f32),
         (None, Kind::Lreal) => Value::Lreal(value.int() as f64),
         (None, Kind::Bool) => Value::Int(i128::from(value.int() != 0)),
-        (None, Kind::Time) if from != Kind::Time => Value::Int(to.wrap(value.int().wrapping_mul(MILLISECOND))),
-        (None, _) if from == Kind::Time && to != Kind::Time => Value::Int(to.wrap(value.int() / MILLISECOND)),
         (None, _) => Value::Int(to.wrap(value.int())),
     }
-}
-
-/// `STRING_TO_x` of a decimal prefix.
-#[must_use]
-pub fn number_in(kind: Kind, text: &[u8]) -> Value {
-    let (sign, digits) = match text.split_first() {
-        // A sign is no valid beginning of a number without one.
-        Some((b'-', rest)) if kind.is_signed() => (-1, rest),
-        _ => (1, text),
-    };
-    let end = digits.iter().position(|byte| !byte.is_ascii_digit()).unwrap_or(digits.len());
-    let number = digits[..end].iter().fold(0_i128, |sum, digit| sum * 10 + i128::from(digit - b'0'));
-    Value::Int(kind.wrap(sign * number))
 }
 
 fn shift(function: Function, kind: Kind, value: i128, count: i128) -> i128 {
@@ -200,59 +182,89 @@ fn shift(function: Function, kind: Kind, value: i128, count: i128) -> i128 {
     }
 }
 
-/// The bytes `from..from + count` by a 1-based position, clamped to the string.
-fn span(text: &[u8], count: i128, position: i128) -> (usize, usize) {
-    let start = (position - 1).clamp(0, text.len() as i128) as usize;
-    let count = count.clamp(0, (text.len() - start) as i128) as usize;
-    (start, start + count)
+/// A function of one float.
+fn float(function: Function, value: &Value) -> Option<Value> {
+    macro_rules! table {
+        ($($name:ident $narrow:path, $wide:path);* $(;)?) => {
+            match (function, value) {
+                $((Function::$name, Value::Real(value)) => Some(Value::Real($narrow(*value))),
+                (Function::$name, Value::Lreal(value)) => Some(Value::Lreal($wide(*value))),)*
+                _ => None,
+            }
+        };
+    }
+    table! {
+        Sqrt f32::sqrt, f64::sqrt;
+        Ln libm::logf, libm::log;
+        Log libm::log10f, libm::log10;
+        Exp libm::expf, libm::exp;
+        Sin libm::sinf, libm::sin;
+        Cos libm::cosf, libm::cos;
+        Tan libm::tanf, libm::tan;
+        Asin libm::asinf, libm::asin;
+        Acos libm::acosf, libm::acos;
+        Atan libm::atanf, libm::atan;
+        Abs f32::abs, f64::abs;
+    }
 }
 
-fn string(function: Function, values: &[Value]) -> Value {
-    let text = values[0].bytes();
-    let number = |at: usize| values[at].int();
-    let clamped = |at: usize| number(at).clamp(0, text.len() as i128) as usize;
-    Value::Str(match function {
-        Function::Left => text[..clamped(1)].to_vec(),
-        Function::Right => text[text.len() - clamped(1)..].to_vec(),
-        Function::Mid => {
-            let (from, to) = span(text, number(1), number(2));
-            text[from..to].to_vec()
-        }
-        Function::Concat => values.iter().flat_map(|value| value.bytes().to_vec()).collect(),
-        Function::Insert => {
-            let at = clamped(2);
-            [&text[..at], values[1].bytes(), &text[at..]].concat()
-        }
-        Function::Delete => {
-            let (from, to) = span(text, number(1), number(2));
-            [&text[..from], &text[to..]].concat()
-        }
-        Function::Replace => {
-            let (from, to) = span(text, number(2), number(3));
-            [&text[..from], values[1].bytes(), &text[to..]].concat()
-        }
-        _ => panic!("{function:?} makes no string"),
+/// The operator that a function folds over its inputs, or whose chain it is.
+fn operator(function: Function) -> Option<Op> {
+    Some(match function {
+        Function::Add => Op::Add,
+        Function::Mul => Op::Mul,
+        Function::Sub => Op::Sub,
+        Function::Div => Op::Div,
+        Function::Mod => Op::Mod,
+        Function::Expt => Op::Pow,
+        Function::And => Op::And,
+        Function::Or => Op::Or,
+        Function::Xor => Op::Xor,
+        Function::Gt => Op::Gt,
+        Function::Ge => Op::Ge,
+        Function::Eq => Op::Eq,
+        Function::Le => Op::Le,
+        Function::Lt => Op::Lt,
+        Function::Ne => Op::Ne,
+        _ => return None,
     })
 }
 
-/// A standard function; integers wrap in `kind`.
+/// Whether a function compares its inputs.
+#[must_use]
+pub fn compares(function: Function) -> bool {
+    operator(function).is_some_and(|op| compare(op, &Value::Int(0), &Value::Int(0)).is_some())
+}
+
+/// A standard function; the inputs and the result of arithmetic are of type `kind`, in which integers wrap. None: its meaning is not written here.
+///
+/// # Errors
+/// A division of integers by zero.
 ///
 /// # Panics
 /// When the tree is wrong.
-#[must_use]
-pub fn standard(function: Function, kind: Kind, values: &[Value]) -> Value {
+pub fn standard(function: Function, kind: Kind, values: &[Value]) -> Result<Option<Value>, TrapCode> {
     let fold = |greatest: bool| values[1..].iter().fold(values[0].clone(), |a, b| pick(a, b.clone(), greatest));
-    match function {
-        Function::Abs => match &values[0] {
-            Value::Real(value) => Value::Real(value.abs()),
-            Value::Lreal(value) => Value::Lreal(value.abs()),
-            value => Value::Int(kind.wrap(value.int().abs())),
+    if let Some(op) = operator(function) {
+        if compares(function) {
+            let all = values.windows(2).all(|pair| compare(op, &pair[0], &pair[1]) == Some(true));
+            return Ok(Some(Value::Int(i128::from(all))));
+        }
+        let first = values[0].clone();
+        return values[1..].iter().try_fold(first, |a, b| binary(op, kind, &a, b)).map(Some);
+    }
+    if let Some(found) = float(function, &values[0]) {
+        return Ok(Some(found));
+    }
+    Ok(Some(match function {
+        Function::Abs => Value::Int(kind.wrap(values[0].int().abs())),
+        Function::Not => complement(kind, &values[0]),
+        Function::Atan2 => match (&values[0], &values[1]) {
+            (Value::Real(y), Value::Real(x)) => Value::Real(libm::atan2f(*y, *x)),
+            (Value::Lreal(y), Value::Lreal(x)) => Value::Lreal(libm::atan2(*y, *x)),
+            other => panic!("ATAN2 of {other:?}"),
         },
-        Function::Sqrt => match &values[0] {
-            Value::Real(value) => Value::Real(value.sqrt()),
-            Value::Lreal(value) => Value::Lreal(value.sqrt()),
-            other => panic!("SQRT of {other:?}"),
-        },
+        Function::Trunc => convert(Kind::Lreal, kind, &values[0], true),
         Function::Min => fold(false),
         Function::Max => fold(true),
         Function::Limit => {
@@ -268,18 +280,7 @@ pub fn standard(function: Function, kind: Kind, values: &[Value]) -> Value {
         Function::Shl | Function::Shr | Function::Rol | Function::Ror => {
             Value::Int(kind.wrap(shift(function, kind, values[0].int(), values[1].int())))
         }
-        Function::Add | Function::Mul => {
-            let op = if function == Function::Add { Op::Add } else { Op::Mul };
-            let step = |a: Value, b: &Value| binary(op, kind, &a, b).unwrap_or(a);
-            values[1..].iter().fold(values[0].clone(), step)
-        }
         Function::Move => values[0].clone(),
-        Function::Len => Value::Int(values[0].bytes().len() as i128),
-        Function::Find => {
-            let (text, wanted) = (values[0].bytes(), values[1].bytes());
-            let found = text.windows(wanted.len().max(1)).position(|window| window == wanted);
-            Value::Int(found.map_or(0, |at| at as i128 + 1))
-        }
-        _ => string(function, values),
-    }
+        _ => return Ok(super::text::function(function, values)),
+    }))
 }

@@ -1,11 +1,43 @@
 //! From a seed to a program: POUs and their statements.
 
-use super::expression::Shape;
+use super::places::{Shape, is_plain};
 use super::tree::{Arg, Base, Class, Def, Expr, ExprKind, Kind, Place, Source, Stmt, Ty, Unit, UnitKind, Value, Var};
 use crate::random::Random;
 
 /// A loop around the statement that is being made: control variable, its lowest and highest value.
 pub(super) type Around = (usize, i128, i128);
+
+/// How large a program is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Size {
+    /// A few statements.
+    Small,
+    /// Some units, some dozens of statements.
+    Usual,
+    /// Many units.
+    Large,
+}
+
+impl Size {
+    /// The size of a seed's program: most are small, because what breaks mostly breaks there too.
+    #[must_use]
+    pub fn of(seed: u64) -> Size {
+        match Random::new(seed ^ 0x7369_7A65).below(20) {
+            0..=11 => Size::Small,
+            12..=18 => Size::Usual,
+            _ => Size::Large,
+        }
+    }
+
+    /// One of three, by size.
+    pub(super) fn pick<T>(self, small: T, usual: T, large: T) -> T {
+        match self {
+            Size::Small => small,
+            Size::Usual => usual,
+            Size::Large => large,
+        }
+    }
+}
 
 /// What is known while a program is made.
 pub(super) struct Generator {
@@ -20,6 +52,9 @@ pub(super) struct Generator {
     pub is_pure: bool,
     /// Statements that may still be made in the unit.
     pub budget: usize,
+    pub size: Size,
+    /// Whether a CONFIGURATION is made.
+    pub configured: bool,
 }
 
 /// The program of a seed.
@@ -34,29 +69,41 @@ pub fn generate(seed: u64) -> Source {
         loops: Vec::new(),
         is_pure: false,
         budget: 0,
+        size: Size::of(seed),
+        configured: false,
     };
+    generator.source.style = if generator.r.chance(70) { generator.r.bits() | 1 } else { 0 };
+    generator.configured = generator.r.chance(25);
     generator.types();
     generator.globals();
-    for number in 0..generator.r.below(4) {
+    let most = generator.size.pick(2, 4, 7);
+    for number in 0..generator.r.below(most) {
         generator.make_unit(UnitKind::Function, format!("f{number}"));
     }
-    for number in 0..generator.r.below(4) {
+    for number in 0..generator.r.below(most) {
         generator.make_unit(UnitKind::Block, format!("Block{number}"));
     }
-    generator.make_unit(UnitKind::Program, "main".to_string());
+    if generator.configured {
+        generator.configuration();
+    } else {
+        generator.make_unit(UnitKind::Program, "main".to_string());
+    }
     generator.source
 }
 
 impl Generator {
-    fn make_unit(&mut self, kind: UnitKind, name: String) {
+    pub(super) fn make_unit(&mut self, kind: UnitKind, name: String) {
         self.unit = Unit { name, kind, vars: Vec::new(), body: Vec::new(), gone: false };
         self.variables();
         self.shapes = self.all_shapes();
-        self.budget = if kind == UnitKind::Program { 24 } else { 9 };
-        let count = self.r.between(2, if kind == UnitKind::Program { 14 } else { 5 }) as usize;
+        let is_program = kind == UnitKind::Program;
+        let share = if self.configured { 2 } else { 1 };
+        self.budget = if is_program { self.size.pick(6, 24, 50) / share } else { self.size.pick(4, 9, 14) };
+        let most = if is_program { self.size.pick(4, 14, 30) / share } else { self.size.pick(3, 5, 8) };
+        let least = self.size.pick(1, 2, 4);
+        let count = self.r.between(least, least.max(most as i64)) as usize;
         let mut body = self.list(count, 0);
-        if kind == UnitKind::Function {
-            let result = self.unit.vars[0].ty;
+        if let Some(result) = self.unit.vars.first().filter(|var| var.class == Class::Return).map(|var| var.ty) {
             let place = Place { base: Base::Var(0), steps: Vec::new(), ty: result };
             if let Some(value) = self.value(result, 3) {
                 body.push(Stmt::Assign(place, value));
@@ -67,25 +114,26 @@ impl Generator {
         let (is_block, name) = (kind == UnitKind::Block, made.name.clone());
         self.source.units.push(made);
         if is_block {
-            let def = Def::Block(self.source.units.len() - 1);
-            self.source.types.push(super::tree::Type { name, def, gone: true });
-            if self.r.chance(40) {
-                let element = Ty::N(self.source.types.len() - 1);
-                let low = self.r.between(-2, 1) as i32;
-                let dims = vec![(low, low + self.r.between(1, 2) as i32)];
-                self.source.types.push(super::tree::Type {
-                    name: String::new(),
-                    def: Def::Array(dims, element),
-                    gone: false,
-                });
-            } else if self.r.chance(40) {
-                let block = Ty::N(self.source.types.len() - 1);
-                let count = Ty::K(self.kind());
-                let fields = vec![("inner".to_string(), block, None), ("count".to_string(), count, None)];
-                let name = format!("Holder{}", self.source.types.len());
-                // It is declared after the units in the tree's order only; ST has no order.
-                self.source.types.push(super::tree::Type { name, def: Def::Struct(fields), gone: false });
-            }
+            self.block_types(name);
+        }
+    }
+
+    /// Types of a block that has just been made: itself, perhaps an array or a structure with it.
+    fn block_types(&mut self, name: String) {
+        let def = Def::Block(self.source.units.len() - 1);
+        self.source.types.push(super::tree::Type { name, def, gone: true });
+        let block = Ty::N(self.source.types.len() - 1);
+        if self.r.chance(40) {
+            let low = self.r.between(-2, 1) as i32;
+            let dims = vec![(low, low + self.r.between(1, 2) as i32)];
+            let def = Def::Array(dims, block);
+            self.source.types.push(super::tree::Type { name: String::new(), def, gone: false });
+        } else if self.r.chance(40) {
+            let count = Ty::K(self.kind());
+            let fields = vec![("inner".to_string(), block, None), ("count".to_string(), count, None)];
+            let name = format!("Holder{}", self.source.types.len());
+            // It is declared after the units in the tree's order only; ST has no order.
+            self.source.types.push(super::tree::Type { name, def: Def::Struct(fields), gone: false });
         }
     }
 
@@ -114,8 +162,8 @@ impl Generator {
         let nested = usize::from(depth < 3);
         let looping = usize::from(self.loops.len() < 2 && depth < 3);
         let leaving = usize::from(depth > 0);
-        match self.r.weighted(&[40, 10 * nested, 6 * nested, 9 * looping, 4 * looping, 4 * looping, 14, 3 * leaving, 6])
-        {
+        let weights = [40, 10 * nested, 6 * nested, 9 * looping, 4 * looping, 4 * looping, 14, 3 * leaving, 6, 4];
+        match self.r.weighted(&weights) {
             0 => self.assign(),
             1 => {
                 let mut branches = Vec::new();
@@ -153,8 +201,33 @@ impl Generator {
                 };
                 Some(Stmt::If(vec![(condition, vec![leave])], Vec::new()))
             }
-            _ => self.copy(),
+            8 => self.copy(),
+            _ => self.call_function(),
         }
+    }
+
+    /// A function for what it does, whether it has a result or not.
+    fn call_function(&mut self) -> Option<Stmt> {
+        let functions = (0..self.source.units.len()).filter(|at| self.source.units[*at].kind == UnitKind::Function);
+        let functions: Vec<usize> = functions.collect();
+        let unit = *self.r.pick(&functions)?;
+        let params: Vec<(Class, Ty)> = self.source.units[unit].vars.iter().map(|var| (var.class, var.ty)).collect();
+        let mut args = self.args(&params, 85)?;
+        self.enable(&mut args, 15);
+        Some(Stmt::Do(unit, args))
+    }
+
+    /// Sometimes an EN before the arguments and an ENO behind them.
+    pub(super) fn enable(&mut self, args: &mut Vec<Arg>, percent: usize) {
+        if !self.r.chance(percent) {
+            return;
+        }
+        let was = std::mem::replace(&mut self.is_pure, true);
+        let condition = self.expr(Kind::Bool, 2);
+        let eno = self.place(Ty::K(Kind::Bool), true).filter(is_plain);
+        self.is_pure = was;
+        args.insert(0, Arg::En(condition));
+        args.extend(eno.filter(|_| self.r.chance(60)).map(Arg::Eno));
     }
 
     /// A whole structure or array to another of its type.
@@ -168,10 +241,8 @@ impl Generator {
             .collect();
         let ty = *self.r.pick(&wanted)?;
         let was = std::mem::replace(&mut self.is_pure, true);
-        let target = self.place(ty, true);
-        let is_indexed = target
-            .as_ref()
-            .is_some_and(|place| place.steps.iter().any(|step| matches!(step, super::tree::Step::Index(_))));
+        let target = self.address_of(ty, true);
+        let is_indexed = target.as_ref().is_some_and(|place| !is_plain(place));
         self.is_pure = was || is_indexed;
         let value = self.value(ty, 2);
         self.is_pure = was;
@@ -198,14 +269,28 @@ impl Generator {
         self.is_pure |= place_is_safe;
         let place = self.place(ty, true);
         self.is_pure = was || !place_is_safe;
-        let is_indexed = place
-            .as_ref()
-            .is_some_and(|place| place.steps.iter().any(|step| matches!(step, super::tree::Step::Index(_))));
+        let is_indexed = place.as_ref().is_some_and(|place| !is_plain(place));
         self.is_pure |= is_indexed && self.r.chance(50);
         let no_calls = is_indexed;
         let value = if no_calls { self.without_calls(ty) } else { self.value(ty, 4) };
         self.is_pure = was;
-        Some(Stmt::Assign(place?, value?))
+        let (place, mut value) = (place?, value?);
+        self.settle_eno(&place, &mut value);
+        Some(Stmt::Assign(place, value))
+    }
+
+    /// Whether the result or ENO is stored first is left open: no ENO that may be where the result goes.
+    fn settle_eno(&self, target: &Place, value: &mut Expr) {
+        match &mut value.kind {
+            ExprKind::Widen(inner) => self.settle_eno(target, inner),
+            ExprKind::Call(_, args) => args.retain(|arg| {
+                let Arg::Eno(place) = arg else { return true };
+                let Base::Var(at) = place.base else { return false };
+                let var = &self.unit.vars[at];
+                place.base != target.base && var.class != Class::InOut && var.at.is_none()
+            }),
+            _ => {}
+        }
     }
 
     /// A value that may trap but stores nothing: indices of the target were evaluated before it, or after.
@@ -218,9 +303,9 @@ impl Generator {
 
     fn case(&mut self, depth: usize) -> Option<Stmt> {
         let enums: Vec<usize> =
-            (0..self.source.types.len()).filter(|id| matches!(self.source.types[*id].def, Def::Enum(_))).collect();
+            (0..self.source.types.len()).filter(|id| matches!(self.source.types[*id].def, Def::Enum(..))).collect();
         if let Some(id) = self.r.pick(&enums).copied().filter(|_| self.r.chance(40)) {
-            let Def::Enum(values) = self.source.types[id].def.clone() else { return None };
+            let Def::Enum(_, values) = self.source.types[id].def.clone() else { return None };
             let selector = self.value(Ty::N(id), 2)?;
             let mut branches = Vec::new();
             for (_, value) in values.iter().take(2) {
@@ -229,7 +314,7 @@ impl Generator {
             let otherwise = if self.r.chance(50) { self.some(depth) } else { Vec::new() };
             return Some(Stmt::Case(selector, branches, otherwise));
         }
-        let kind = self.r.one_of(Kind::INTEGERS);
+        let kind = if self.r.chance(15) { self.r.one_of(Kind::BITS) } else { self.r.one_of(Kind::INTEGERS) };
         let (low, high) = kind.limits();
         let selector = self.expr(kind, 2);
         let mut from = if self.r.chance(20) { low } else { i128::from(self.r.between(-3, 2)).max(low) };
@@ -255,7 +340,16 @@ impl Generator {
     fn reserve(&mut self, kind: Kind) -> usize {
         let name = format!("k{}", self.unit.vars.len());
         let class = if self.unit.kind != UnitKind::Function && self.r.chance(50) { Class::Temp } else { Class::Var };
-        self.unit.vars.push(Var { name, ty: Ty::K(kind), class, init: None, reserved: true, gone: false });
+        self.unit.vars.push(Var {
+            name,
+            ty: Ty::K(kind),
+            class,
+            init: None,
+            reserved: true,
+            at: None,
+            retain: false,
+            gone: false,
+        });
         self.unit.vars.len() - 1
     }
 
@@ -321,8 +415,11 @@ impl Generator {
         };
         // What is stored in the block when a later argument traps is left open: nothing here traps.
         let was = std::mem::replace(&mut self.is_pure, true);
-        let place = self.place(ty, false);
+        let place = self.address_of(ty, false);
         let mut args = self.args(&params, 80);
+        if let Some(args) = &mut args {
+            self.enable(args, 8);
+        }
         self.is_pure = was;
         if matches!(self.source.types[id].def, Def::Standard(_)) {
             args.iter_mut().flatten().for_each(no_negative_time);
@@ -340,13 +437,17 @@ impl Generator {
                     let value = self.value(*ty, 2)?;
                     args.push(Arg::In(at, value));
                 }
-                Class::InOut => args.push(Arg::InOut(at, self.place(*ty, true)?)),
+                Class::InOut => {
+                    let place = self.address_of(*ty, true)?;
+                    if self.is_bit(&place) {
+                        return None;
+                    }
+                    args.push(Arg::InOut(at, place));
+                }
                 Class::Output if self.r.chance(40) => {
                     let was = std::mem::replace(&mut self.is_pure, true);
                     let target = self.place(*ty, true);
                     self.is_pure = was;
-                    let is_plain =
-                        |place: &Place| !place.steps.iter().any(|step| matches!(step, super::tree::Step::Index(_)));
                     if let Some(target) = target.filter(is_plain) {
                         args.push(Arg::Out(at, target));
                     }
@@ -356,12 +457,22 @@ impl Generator {
         }
         Some(args)
     }
+
+    /// Whether a place is a bit of the process image, which has no address.
+    fn is_bit(&self, place: &Place) -> bool {
+        let located = match place.base {
+            Base::Var(at) => self.unit.vars[at].at.is_some(),
+            Base::Global(at) => self.source.globals[at].at.is_some(),
+            Base::Direct(_) => true,
+        };
+        located && place.ty == Ty::K(Kind::Bool)
+    }
 }
 
 /// The standard's figures say nothing of a timer with a negative time.
 fn no_negative_time(arg: &mut Arg) {
     if let Arg::In(_, value) = arg
-        && value.ty == Ty::K(Kind::Time)
+        && matches!(value.ty, Ty::K(Kind::Time | Kind::Ltime))
     {
         let zero = Expr { ty: value.ty, kind: ExprKind::Lit(Value::Int(0), true) };
         let inputs = vec![zero, value.clone()];

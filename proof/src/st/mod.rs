@@ -8,19 +8,28 @@
 
 pub mod blocks;
 pub mod c;
+mod calls;
 pub mod case;
 pub mod compare;
+mod configure;
+pub mod coverage;
 mod declare;
 pub mod evaluate;
 mod expression;
 mod flow;
 pub mod functions;
 mod generate;
+mod memory;
+mod places;
+pub mod position;
 pub mod print;
 pub mod reduce;
+pub mod rounds;
 pub mod shrink;
+mod spelling;
 mod sweep;
+pub mod text;
 pub mod tree;
 mod visit;
 
-pub use generate::generate;
+pub use generate::{Size, generate};

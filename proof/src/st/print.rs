@@ -1,134 +1,36 @@
 //! The tree as Structured Text.
 
-use std::fmt::Write;
-
+use super::functions::{Function, row};
+use super::position::{Key, Positions};
+use super::spelling::{Style, address, type_name};
 use super::tree::{
-    Arg, Base, Class, Def, Expr, ExprKind, Kind, Op, Place, Source, Step, Stmt, Ty, Unit, UnitKind, Value, Var,
+    Arg, Base, Class, Config, Def, Expr, ExprKind, Kind, Op, Place, Source, Step, Stmt, Ty, Unit, UnitKind, Value, Var,
 };
 
 /// The text of a program. The parentheses are those that precedence needs.
 #[must_use]
 pub fn print(source: &Source) -> String {
-    let mut out = String::new();
-    let types = source.types.iter().filter(|ty| !ty.gone && !ty.name.is_empty());
-    for ty in types {
-        if let Some(def) = definition(source, &ty.def) {
-            let _ = writeln!(out, "TYPE {} : {def}; END_TYPE", ty.name);
-        }
-    }
-    let printer = Printer { source, unit: None };
-    if source.globals.iter().any(|var| !var.gone) {
-        out.push_str("VAR_GLOBAL\n");
-        source.globals.iter().filter(|var| !var.gone).for_each(|var| printer.var(var, &mut out));
-        out.push_str("END_VAR\n");
-    }
-    for unit in source.units.iter().filter(|unit| !unit.gone) {
-        Printer { source, unit: Some(unit) }.unit(unit, &mut out);
-    }
-    out
+    print_positions(source).0
 }
 
-fn definition(source: &Source, def: &Def) -> Option<String> {
-    Some(match def {
-        Def::Struct(fields) => {
-            let mut text = String::from("STRUCT ");
-            for (name, ty, init) in fields {
-                let init =
-                    init.as_ref().map_or(String::new(), |value| format!(" := {}", literal(source, *ty, value, false)));
-                let _ = write!(text, "{name} : {}{init}; ", type_name(source, *ty));
-            }
-            text + "END_STRUCT"
-        }
-        Def::Enum(values) => {
-            let parts: Vec<String> = values.iter().map(|(name, value)| format!("{name} := {value}")).collect();
-            format!("({})", parts.join(", "))
-        }
-        Def::Subrange(base, low, high) => format!("{}({low}..{high})", base.name()),
-        Def::Array(dims, element) => {
-            let dims: Vec<String> = dims.iter().map(|(low, high)| format!("{low}..{high}")).collect();
-            format!("ARRAY[{}] OF {}", dims.join(", "), type_name(source, *element))
-        }
-        Def::Block(_) | Def::Standard(_) => return None,
-    })
-}
-
-fn type_name(source: &Source, ty: Ty) -> String {
-    match ty {
-        Ty::K(kind) => kind.name().to_string(),
-        Ty::S(80) => "STRING".to_string(),
-        Ty::S(capacity) => format!("STRING[{capacity}]"),
-        Ty::N(id) => match &source.types[id].def {
-            Def::Block(unit) => source.units[*unit].name.clone(),
-            Def::Standard(standard) => standard.name().to_string(),
-            def if source.types[id].name.is_empty() => definition(source, def).unwrap_or_default(),
-            _ => source.types[id].name.clone(),
-        },
+/// The text of a program, and where its parts stand in it.
+#[must_use]
+pub fn print_positions(source: &Source) -> (String, Positions) {
+    let style = Style::new(source.style);
+    let mut printer = Printer { source, unit: None, style, out: String::new(), positions: Positions::default() };
+    printer.types();
+    printer.globals();
+    for (at, unit) in source.units.iter().enumerate().filter(|(_, unit)| !unit.gone) {
+        printer.unit = Some(unit);
+        let startup = source.config.as_ref().is_some_and(|config| config.startup == Some(at));
+        printer.unit(unit, startup);
     }
-}
-
-fn real(text: &str) -> String {
-    match text.split_once('e') {
-        Some((digits, exponent)) if !digits.contains('.') => format!("{digits}.0e{exponent}"),
-        None if !text.contains('.') => format!("{text}.0"),
-        _ => text.to_string(),
+    printer.unit = None;
+    if let Some(config) = &source.config {
+        printer.config(config);
     }
-}
-
-fn time(nanoseconds: i128) -> String {
-    let sign = if nanoseconds < 0 { "-" } else { "" };
-    let all = nanoseconds.unsigned_abs();
-    format!("T#{sign}{}ms{}us{}ns", all / 1_000_000, all / 1000 % 1000, all % 1000)
-}
-
-fn quoted(bytes: &[u8]) -> String {
-    let mut text = String::from("'");
-    for byte in bytes {
-        match byte {
-            b'\'' => text.push_str("$'"),
-            b'$' => text.push_str("$$"),
-            32..=126 => text.push(char::from(*byte)),
-            _ => drop(write!(text, "${byte:02X}")),
-        }
-    }
-    text + "'"
-}
-
-/// A literal, with its type before it if `typed`.
-pub(crate) fn literal(source: &Source, ty: Ty, value: &Value, typed: bool) -> String {
-    let (prefix, plain) = match (ty, value) {
-        (Ty::K(Kind::Bool), _) => return if value.int() == 0 { "FALSE" } else { "TRUE" }.to_string(),
-        (Ty::K(Kind::Time), _) => return time(value.int()),
-        (Ty::K(kind), Value::Int(value)) if kind.is_bits() => (kind.name(), format!("16#{value:X}")),
-        (Ty::K(kind), Value::Int(value)) => (kind.name(), value.to_string()),
-        (Ty::K(kind), Value::Real(value)) => (kind.name(), real(&format!("{value:?}"))),
-        (Ty::K(kind), Value::Lreal(value)) => (kind.name(), real(&format!("{value:?}"))),
-        (_, Value::Str(bytes)) => return quoted(bytes),
-        (Ty::N(id), Value::Int(value)) => match &source.types[id].def {
-            Def::Enum(values) => {
-                let name = values.iter().find(|(_, known)| i128::from(*known) == *value).map_or("?", |(name, _)| name);
-                return if typed { format!("{}#{name}", source.types[id].name) } else { name.to_string() };
-            }
-            _ => return value.to_string(),
-        },
-        (Ty::N(id), Value::Many(parts)) => {
-            return match &source.types[id].def {
-                Def::Array(_, element) => {
-                    let parts: Vec<String> = parts.iter().map(|part| literal(source, *element, part, false)).collect();
-                    format!("[{}]", parts.join(", "))
-                }
-                Def::Struct(fields) => {
-                    let field = |((name, ty, _), part): (&(String, Ty, Option<Value>), &Value)| {
-                        format!("{name} := {}", literal(source, *ty, part, false))
-                    };
-                    let parts: Vec<String> = fields.iter().zip(parts).map(field).collect();
-                    format!("({})", parts.join(", "))
-                }
-                other => panic!("no literal of {other:?}"),
-            };
-        }
-        _ => panic!("no literal of {ty:?}"),
-    };
-    if typed { format!("{prefix}#{plain}") } else { plain }
+    printer.positions.finish(&printer.out);
+    (printer.out, printer.positions)
 }
 
 /// Binding strength, loosest first.
@@ -141,215 +43,520 @@ fn strength(op: Op) -> u8 {
         Op::Lt | Op::Le | Op::Gt | Op::Ge => 5,
         Op::Add | Op::Sub => 6,
         Op::Mul | Op::Div | Op::Mod => 7,
+        Op::Pow => 8,
     }
 }
 
-const UNARY: u8 = 8;
-const ATOM: u8 = 9;
+const UNARY: u8 = 9;
+const ATOM: u8 = 10;
+
+fn sign(op: Op) -> &'static str {
+    match op {
+        Op::Add => "+",
+        Op::Sub => "-",
+        Op::Mul => "*",
+        Op::Div => "/",
+        Op::Mod => "MOD",
+        Op::And => "AND",
+        Op::Or => "OR",
+        Op::Xor => "XOR",
+        Op::AndThen => "AND_THEN",
+        Op::OrElse => "OR_ELSE",
+        Op::Eq => "=",
+        Op::Ne => "<>",
+        Op::Lt => "<",
+        Op::Le => "<=",
+        Op::Gt => ">",
+        Op::Ge => ">=",
+        Op::Pow => "**",
+    }
+}
 
 struct Printer<'s> {
     source: &'s Source,
     unit: Option<&'s Unit>,
+    style: Style,
+    out: String,
+    positions: Positions,
 }
 
-impl Printer<'_> {
-    fn var(&self, var: &Var, out: &mut String) {
-        let init = var
-            .init
-            .as_ref()
-            .map_or(String::new(), |value| format!(" := {}", literal(self.source, var.ty, value, false)));
-        let _ = writeln!(out, "  {} : {}{init};", var.name, type_name(self.source, var.ty));
+impl<'s> Printer<'s> {
+    fn put(&mut self, text: &str) {
+        self.out.push_str(text);
     }
 
-    fn unit(&self, unit: &Unit, out: &mut String) {
-        let (word, result) = match unit.kind {
-            UnitKind::Function => ("FUNCTION", format!(" : {}", type_name(self.source, unit.vars[0].ty))),
-            UnitKind::Block => ("FUNCTION_BLOCK", String::new()),
-            UnitKind::Program => ("PROGRAM", String::new()),
-        };
-        let _ = writeln!(out, "{word} {}{result}", unit.name);
-        let sections = [
-            (Class::Input, "VAR_INPUT"),
-            (Class::Output, "VAR_OUTPUT"),
-            (Class::InOut, "VAR_IN_OUT"),
-            (Class::Var, "VAR"),
-            (Class::Temp, "VAR_TEMP"),
-            (Class::Constant, "VAR CONSTANT"),
-        ];
-        for (class, heading) in sections {
-            let vars = || unit.vars.iter().filter(|var| var.class == class && !var.gone);
-            if vars().next().is_some() {
-                let _ = writeln!(out, "{heading}");
-                vars().for_each(|var| self.var(var, out));
-                out.push_str("END_VAR\n");
+    fn line(&mut self, text: &str) {
+        self.put(text);
+        // What must not matter.
+        if self.style.chance(2) {
+            self.put(" // line");
+        }
+        if self.style.chance(2) {
+            self.put(" (* in (* nested *) one *)");
+        }
+        self.out.push('\n');
+    }
+
+    fn pragma(&mut self) {
+        if self.style.chance(4) {
+            self.line("{attribute 'displaymode' := 'hex'}");
+        }
+    }
+
+    fn types(&mut self) {
+        for ty in self.source.types.iter().filter(|ty| !ty.gone && !ty.name.is_empty()) {
+            if let Some(def) = self.style.definition(self.source, &ty.def) {
+                self.pragma();
+                self.line(&format!("TYPE {} : {def}; END_TYPE", ty.name));
             }
         }
-        self.list(&unit.body, 1, out);
-        let _ = writeln!(out, "END_{word}");
     }
 
-    fn name(&self, at: usize) -> &str {
-        self.unit.map_or("?", |unit| unit.vars[at].name.as_str())
+    fn globals(&mut self) {
+        let source = self.source;
+        for (heading, retain, constant) in
+            [("VAR_GLOBAL", false, false), ("VAR_GLOBAL RETAIN", true, false), ("VAR_GLOBAL CONSTANT", false, true)]
+        {
+            let fits = |var: &&Var| !var.gone && var.retain == retain && (var.class == Class::Constant) == constant;
+            self.section(heading, source.globals.iter().filter(fits));
+        }
     }
 
-    fn place(&self, place: &Place) -> String {
-        let (mut text, mut ty) = match place.base {
-            Base::Global(at) => (self.source.globals[at].name.clone(), self.source.globals[at].ty),
-            Base::Var(at) => (self.name(at).to_string(), self.unit.map_or(Ty::S(0), |unit| unit.vars[at].ty)),
+    fn section(&mut self, heading: &str, vars: impl Iterator<Item = &'s Var>) {
+        let mut vars = vars.peekable();
+        if vars.peek().is_none() {
+            return;
+        }
+        self.line(heading);
+        for var in vars {
+            self.pragma();
+            self.var(var);
+        }
+        self.line("END_VAR");
+    }
+
+    fn var(&mut self, var: &Var) {
+        let at = match (var.at, self.source.plain(var.ty)) {
+            (Some(at), Ty::K(kind)) => format!(" AT {}", address(at, kind)),
+            _ => String::new(),
+        };
+        let init = var.init.as_ref().map(|value| format!(" := {}", self.style.initial(self.source, var.ty, value)));
+        let ty = type_name(self.source, var.ty);
+        self.line(&format!("  {}{at} : {ty}{};", var.name, init.unwrap_or_default()));
+    }
+
+    fn unit(&mut self, unit: &'s Unit, startup: bool) {
+        let (word, result) = match unit.kind {
+            UnitKind::Function => ("FUNCTION", unit.vars.first().filter(|var| var.class == Class::Return)),
+            UnitKind::Block => ("FUNCTION_BLOCK", None),
+            UnitKind::Program => ("PROGRAM", None),
+        };
+        self.pragma();
+        if startup {
+            self.line("{attribute 'startup'}");
+        }
+        let result = result.map(|var| format!(" : {}", type_name(self.source, var.ty)));
+        self.line(&format!("{word} {}{}", unit.name, result.unwrap_or_default()));
+        let sections = [
+            (Class::Input, false, "VAR_INPUT"),
+            (Class::InOut, false, "VAR_IN_OUT"),
+            (Class::Output, false, "VAR_OUTPUT"),
+            (Class::Var, false, "VAR"),
+            (Class::Var, true, "VAR RETAIN"),
+            (Class::Temp, false, "VAR_TEMP"),
+            (Class::Constant, false, "VAR CONSTANT"),
+        ];
+        for (class, retain, heading) in sections {
+            let fits = |var: &&Var| var.class == class && var.retain == retain && !var.gone;
+            self.section(heading, unit.vars.iter().filter(fits));
+        }
+        self.list(&unit.body, 1);
+        self.line(&format!("END_{word}"));
+    }
+
+    fn config(&mut self, config: &Config) {
+        self.line("CONFIGURATION plant\n  RESOURCE cpu ON PLC");
+        for task in &config.tasks {
+            let single = task.single.map(|at| format!("SINGLE := {}, ", self.source.globals[at].name));
+            let interval = task.interval_us.map(|us| format!("INTERVAL := T#{us}us, "));
+            let (single, interval) = (single.unwrap_or_default(), interval.unwrap_or_default());
+            self.line(&format!("    TASK {}({single}{interval}PRIORITY := {});", task.name, task.priority));
+        }
+        for instance in &config.instances {
+            let task = instance.task.map(|task| format!(" WITH {}", config.tasks[task].name));
+            let unit = &self.source.units[instance.unit];
+            self.put(&format!("    PROGRAM {}{} : {}", instance.name, task.unwrap_or_default(), unit.name));
+            if !instance.args.is_empty() {
+                self.put("(");
+                self.args(&instance.args, &|at| unit.vars[at].name.clone());
+                self.put(")");
+            }
+            self.line(";");
+        }
+        self.line("  END_RESOURCE\nEND_CONFIGURATION");
+    }
+
+    fn name(&mut self, name: &str) {
+        let text = if self.style.chance(3) { name.to_uppercase() } else { name.to_string() };
+        self.put(&text);
+    }
+
+    fn var_name(&mut self, at: usize) {
+        let name = self.unit.map_or("?", |unit| unit.vars[at].name.as_str());
+        self.name(name);
+    }
+
+    fn place(&mut self, place: &Place) {
+        self.positions.note(Key::of_place(place), self.out.len());
+        let mut ty = match place.base {
+            Base::Global(at) => {
+                self.name(&self.source.globals[at].name);
+                self.source.globals[at].ty
+            }
+            Base::Var(at) => {
+                self.var_name(at);
+                self.unit.map_or(Ty::S(0), |unit| unit.vars[at].ty)
+            }
+            Base::Direct(at) => {
+                let kind = if let Ty::K(kind) = place.ty { kind } else { Kind::Bool };
+                self.put(&address(at, kind));
+                place.ty
+            }
         };
         for step in &place.steps {
+            if let Step::Part(first, count) = step {
+                let text = match count {
+                    1 if self.style.chance(40) => format!(".%X{first}"),
+                    1 => format!(".{first}"),
+                    8 => format!(".%B{}", first / 8),
+                    16 => format!(".%W{}", first / 16),
+                    _ => format!(".%D{}", first / 32),
+                };
+                self.put(&text);
+                break;
+            }
             let Ty::N(id) = ty else { panic!("a step into {ty:?}") };
             match (step, &self.source.types[id].def) {
                 (Step::Field(at), def) => {
-                    let (name, next) = match def {
-                        Def::Struct(fields) => (fields[*at].0.clone(), fields[*at].1),
-                        Def::Block(unit) => {
-                            let var = &self.source.units[*unit].vars[*at];
-                            (var.name.clone(), var.ty)
-                        }
-                        Def::Standard(standard) => {
-                            let (name, kind, _) = standard.fields()[*at];
-                            (name.to_string(), Ty::K(kind))
-                        }
+                    let name = match def {
+                        Def::Struct(fields) => fields[*at].0.clone(),
+                        Def::Block(unit) => self.source.units[*unit].vars[*at].name.clone(),
+                        Def::Standard(standard) => standard.fields()[*at].0.to_string(),
                         other => panic!("no field of {other:?}"),
                     };
-                    let _ = write!(text, ".{name}");
-                    ty = next;
+                    ty = self.source.field_type(def, *at);
+                    self.put(&format!(".{name}"));
                 }
                 (Step::Index(indices), Def::Array(_, element)) => {
-                    let indices: Vec<String> = indices.iter().map(|index| self.expr(index, 0)).collect();
-                    let _ = write!(text, "[{}]", indices.join(", "));
+                    self.put("[");
+                    self.joined(indices, |_, _| {});
+                    self.put("]");
                     ty = *element;
                 }
                 (step, def) => panic!("{step:?} into {def:?}"),
             }
         }
-        text
     }
 
-    /// An expression where at least `least` binding strength is wanted.
-    fn expr(&self, expr: &Expr, least: u8) -> String {
-        let (own, text) = match &expr.kind {
-            ExprKind::Lit(value, typed) => {
-                let text = literal(self.source, expr.ty, value, *typed);
-                (if text.starts_with('-') { UNARY - 1 } else { ATOM }, text)
+    fn joined(&mut self, list: &[Expr], before: impl Fn(&mut Self, usize)) {
+        for (at, expr) in list.iter().enumerate() {
+            if at > 0 {
+                self.put(", ");
             }
-            ExprKind::Get(place) => (ATOM, self.place(place)),
-            ExprKind::Bin(op, left, right) => {
-                const SIGNS: [&str; 16] = [
-                    "+", "-", "*", "/", "MOD", "AND", "OR", "XOR", "AND_THEN", "OR_ELSE", "=", "<>", "<", "<=", ">",
-                    ">=",
-                ];
-                let own = strength(*op);
-                // Short forms in a chain with long ones would hang on how they group.
-                let inner = if matches!(op, Op::AndThen | Op::OrElse) { UNARY } else { own };
-                let left = self.expr(left, inner);
-                let right = self.expr(right, inner + 1);
-                let own = if matches!(op, Op::AndThen | Op::OrElse) { 0 } else { own };
-                (own, format!("{left} {} {right}", SIGNS[*op as usize]))
-            }
-            ExprKind::Neg(inner) => (UNARY, format!("-{}", self.expr(inner, ATOM))),
-            ExprKind::Not(inner) => (UNARY, format!("NOT {}", self.expr(inner, ATOM))),
-            ExprKind::Widen(inner) => return self.expr(inner, least),
-            ExprKind::Conv(inner) | ExprKind::Trunc(inner) => {
-                let word = if matches!(expr.kind, ExprKind::Trunc(_)) { "TRUNC" } else { "TO" };
-                let base = |ty: Ty| if let Ty::K(kind) = ty { kind.name() } else { "STRING" };
-                (ATOM, format!("{}_{word}_{}({})", base(inner.ty), base(expr.ty), self.expr(inner, 0)))
-            }
-            ExprKind::Std(function, inputs) => {
-                let inputs: Vec<String> = inputs.iter().map(|input| self.expr(input, 0)).collect();
-                (ATOM, format!("{}({})", function.name(), inputs.join(", ")))
-            }
-            ExprKind::Call(unit, args) => {
-                let callee = &self.source.units[*unit];
-                (ATOM, format!("{}({})", callee.name, self.args(args, &|at| callee.vars[at].name.clone())))
-            }
-        };
-        if own < least { format!("({text})") } else { text }
-    }
-
-    fn args(&self, args: &[Arg], name: &dyn Fn(usize) -> String) -> String {
-        let arg = |arg: &Arg| match arg {
-            Arg::In(at, value) => format!("{} := {}", name(*at), self.expr(value, 0)),
-            Arg::InOut(at, place) => format!("{} := {}", name(*at), self.place(place)),
-            Arg::Out(at, place) => format!("{} => {}", name(*at), self.place(place)),
-        };
-        args.iter().map(arg).collect::<Vec<_>>().join(", ")
-    }
-
-    fn list(&self, list: &[Stmt], depth: usize, out: &mut String) {
-        for stmt in list {
-            self.stmt(stmt, depth, out);
+            before(self, at);
+            self.expr(expr, 0);
         }
     }
 
-    fn stmt(&self, stmt: &Stmt, depth: usize, out: &mut String) {
-        let pad = "  ".repeat(depth);
-        // Writing to a String does not fail.
-        let _ = match stmt {
-            Stmt::Assign(place, value) => writeln!(out, "{pad}{} := {};", self.place(place), self.expr(value, 0)),
-            Stmt::If(branches, otherwise) => {
-                for (at, (condition, body)) in branches.iter().enumerate() {
-                    let word = if at == 0 { "IF" } else { "ELSIF" };
-                    let _ = writeln!(out, "{pad}{word} {} THEN", self.expr(condition, 0));
-                    self.list(body, depth + 1, out);
-                }
-                if !otherwise.is_empty() {
-                    let _ = writeln!(out, "{pad}ELSE");
-                    self.list(otherwise, depth + 1, out);
-                }
-                writeln!(out, "{pad}END_IF;")
+    /// An expression in parentheses that it would not need: they count as its beginning.
+    fn enclosed(&mut self, expr: &Expr) {
+        let start = self.out.len();
+        self.put("(");
+        self.expr(expr, 0);
+        self.put(")");
+        let mut inner = expr;
+        loop {
+            self.positions.note(Key::of_expr(inner), start);
+            match &inner.kind {
+                ExprKind::Widen(next) => inner = next,
+                ExprKind::Get(place) => return self.positions.note(Key::of_place(place), start),
+                _ => return,
             }
+        }
+    }
+
+    /// An expression where at least `least` binding strength is wanted.
+    fn expr(&mut self, expr: &Expr, least: u8) {
+        self.positions.note(Key::of_expr(expr), self.out.len());
+        let own = match &expr.kind {
+            ExprKind::Widen(inner) => return self.expr(inner, least),
+            ExprKind::Bin(Op::AndThen | Op::OrElse, ..) => 0,
+            ExprKind::Bin(op, ..) => strength(*op),
+            ExprKind::Neg(_) | ExprKind::Not(_) => UNARY,
+            ExprKind::Lit(value, typed) => {
+                let text = self.style.literal(self.source, expr.ty, value, *typed);
+                let wrapped = text.starts_with('-') && least > UNARY - 1;
+                return self.put(&if wrapped { format!("({text})") } else { text });
+            }
+            _ => ATOM,
+        };
+        if own < least {
+            self.put("(");
+        }
+        self.open(expr);
+        if own < least {
+            self.put(")");
+        }
+    }
+
+    fn open(&mut self, expr: &Expr) {
+        match &expr.kind {
+            ExprKind::Lit(..) | ExprKind::Widen(_) => {}
+            ExprKind::Get(place) => self.place(place),
+            ExprKind::Bin(op, left, right) => {
+                // Short forms in a chain with long ones would hang on how they group; `**` next to a sign too.
+                let alone = matches!(op, Op::AndThen | Op::OrElse);
+                let inner = if alone { UNARY } else { strength(*op) };
+                let inner = if *op == Op::Pow { ATOM } else { inner };
+                self.expr(left, inner);
+                let text = if *op == Op::And && self.style.chance(15) { "&" } else { sign(*op) };
+                self.put(&format!(" {text} "));
+                self.expr(right, (inner + 1).min(ATOM));
+            }
+            ExprKind::Neg(inner) => {
+                self.put("-");
+                self.expr(inner, ATOM);
+            }
+            ExprKind::Not(inner) => {
+                self.put("NOT ");
+                self.expr(inner, ATOM);
+            }
+            ExprKind::Conv(inner) | ExprKind::Trunc(inner) => {
+                let word = if matches!(expr.kind, ExprKind::Trunc(_)) { "TRUNC" } else { "TO" };
+                let base = |ty: Ty| match ty {
+                    Ty::K(kind) => kind.name().to_string(),
+                    Ty::N(_) => type_name(self.source, ty),
+                    Ty::S(_) => "STRING".to_string(),
+                };
+                let (from, to) = (base(inner.ty), base(expr.ty));
+                // What the argument is says it too, unless that is a literal without a type.
+                let is_short = self.style.chance(20) && matches!(inner.kind, ExprKind::Get(_));
+                self.put(&if is_short { format!("{word}_{to}(") } else { format!("{from}_{word}_{to}(") });
+                self.expr(inner, 0);
+                self.put(")");
+            }
+            ExprKind::Std(function, inputs) => {
+                let row = row(*function);
+                if let (Function::Not, [input]) = (function, inputs.as_slice()) {
+                    // With one operand in parentheses it is the operator.
+                    self.put("NOT ");
+                    return self.enclosed(input);
+                }
+                self.put(&format!("{}(", row.name));
+                let is_formal = self.style.chance(20);
+                self.joined(inputs, |printer, at| {
+                    let last = row.parameters.len() - 1;
+                    let name = row.parameters[at.min(last)].name;
+                    let stem = name.trim_end_matches(|c: char| c.is_ascii_digit());
+                    let number = name[stem.len()..].parse::<usize>();
+                    let name = match number {
+                        Ok(number) if at > last => format!("{stem}{}", number + at - last),
+                        _ => name.to_string(),
+                    };
+                    if is_formal {
+                        printer.put(&format!("{name} := "));
+                    }
+                });
+                self.put(")");
+            }
+            ExprKind::Call(unit, args) => self.call_function(*unit, args),
+        }
+    }
+
+    fn call_function(&mut self, unit: usize, args: &[Arg]) {
+        let callee = &self.source.units[unit];
+        self.put(&format!("{}(", callee.name));
+        let of = |class: Class| (0..callee.vars.len()).filter(move |at| callee.vars[*at].class == class);
+        let wanted: Vec<usize> = of(Class::Input).chain(of(Class::InOut)).collect();
+        let given: Option<Vec<usize>> = args
+            .iter()
+            .map(|arg| if let Arg::In(at, _) | Arg::InOut(at, _) = arg { Some(*at) } else { None })
+            .collect();
+        if given.is_some_and(|given| given == wanted) && self.style.chance(40) {
+            for (at, arg) in args.iter().enumerate() {
+                if at > 0 {
+                    self.put(", ");
+                }
+                match arg {
+                    Arg::In(_, value) => self.expr(value, 0),
+                    Arg::InOut(_, place) => self.place(place),
+                    _ => {}
+                }
+            }
+        } else {
+            self.args(args, &|at| callee.vars[at].name.clone());
+        }
+        self.put(")");
+    }
+
+    fn args(&mut self, args: &[Arg], name: &dyn Fn(usize) -> String) {
+        for (number, arg) in args.iter().enumerate() {
+            if number > 0 {
+                self.put(", ");
+            }
+            match arg {
+                Arg::In(at, value) => {
+                    self.put(&format!("{} := ", name(*at)));
+                    self.expr(value, 0);
+                }
+                Arg::InOut(at, place) => {
+                    self.put(&format!("{} := ", name(*at)));
+                    self.place(place);
+                }
+                Arg::Out(at, place) => {
+                    self.put(&format!("{} => ", name(*at)));
+                    self.place(place);
+                }
+                Arg::En(value) => {
+                    self.put("EN := ");
+                    self.expr(value, 0);
+                }
+                Arg::Eno(place) => {
+                    self.put("ENO => ");
+                    self.place(place);
+                }
+            }
+        }
+    }
+
+    fn list(&mut self, list: &[Stmt], depth: usize) {
+        for stmt in list {
+            self.stmt(stmt, depth);
+        }
+    }
+
+    fn begin(&mut self, depth: usize, text: &str) {
+        self.put(&"  ".repeat(depth));
+        self.put(text);
+    }
+
+    fn stmt(&mut self, stmt: &Stmt, depth: usize) {
+        self.begin(depth, "");
+        self.positions.note(Key::of_stmt(stmt), self.out.len());
+        match stmt {
+            Stmt::Assign(place, value) => {
+                self.place(place);
+                self.put(" := ");
+                self.expr(value, 0);
+                self.line(";");
+            }
+            Stmt::If(branches, otherwise) => self.if_statement(branches, otherwise, depth),
             Stmt::Case(selector, branches, otherwise) => {
-                let _ = writeln!(out, "{pad}CASE {} OF", self.expr(selector, 0));
-                let label = |value: i128| literal(self.source, selector.ty, &Value::Int(value), false);
+                self.put("CASE ");
+                self.expr(selector, 0);
+                self.line(" OF");
                 for (labels, body) in branches {
-                    let labels = labels.iter().map(|(low, high)| {
-                        if low == high { label(*low) } else { format!("{}..{}", label(*low), label(*high)) }
-                    });
-                    let _ = writeln!(out, "{pad}{}:", labels.collect::<Vec<_>>().join(", "));
-                    self.list(body, depth + 1, out);
+                    self.labels(selector.ty, labels, depth);
+                    self.list(body, depth + 1);
                 }
-                if !otherwise.is_empty() {
-                    let _ = writeln!(out, "{pad}ELSE");
-                    self.list(otherwise, depth + 1, out);
-                }
-                writeln!(out, "{pad}END_CASE;")
+                self.otherwise(otherwise, depth);
+                self.begin(depth, "END_CASE;\n");
             }
-            Stmt::For(control, from, to, by, body) => {
-                let by = by.as_ref().map_or(String::new(), |by| format!(" BY {}", self.expr(by, 0)));
-                let (from, to) = (self.expr(from, 0), self.expr(to, 0));
-                let _ = writeln!(out, "{pad}FOR {} := {from} TO {to}{by} DO", self.name(*control));
-                self.list(body, depth + 1, out);
-                writeln!(out, "{pad}END_FOR;")
-            }
-            Stmt::While(counter, limit, condition, body) => {
-                let name = self.name(*counter);
-                let _ = writeln!(out, "{pad}{name} := 0;");
-                // The condition is not looked at when the counter is at its end.
-                let _ = writeln!(out, "{pad}WHILE {name} < {limit} AND_THEN ({}) DO", self.expr(condition, 0));
-                let _ = writeln!(out, "{pad}  {name} := {name} + 1;");
-                self.list(body, depth + 1, out);
-                writeln!(out, "{pad}END_WHILE;")
-            }
-            Stmt::Repeat(counter, limit, condition, body) => {
-                let name = self.name(*counter);
-                let _ = writeln!(out, "{pad}{name} := 0;\n{pad}REPEAT\n{pad}  {name} := {name} + 1;");
-                self.list(body, depth + 1, out);
-                writeln!(out, "{pad}UNTIL {name} >= {limit} OR_ELSE ({}) END_REPEAT;", self.expr(condition, 0))
-            }
+            Stmt::For(..) | Stmt::While(..) | Stmt::Repeat(..) => self.loop_statement(stmt, depth),
             Stmt::Call(place, args) => {
                 let Ty::N(id) = place.ty else { panic!("a call of {place:?}") };
-                let name = |at: usize| match &self.source.types[id].def {
-                    Def::Block(unit) => self.source.units[*unit].vars[at].name.clone(),
+                let source = self.source;
+                self.place(place);
+                self.put("(");
+                self.args(args, &|at| match &source.types[id].def {
+                    Def::Block(unit) => source.units[*unit].vars[at].name.clone(),
                     Def::Standard(standard) => standard.fields()[at].0.to_string(),
                     _ => String::new(),
-                };
-                writeln!(out, "{pad}{}({});", self.place(place), self.args(args, &name))
+                });
+                self.line(");");
             }
-            Stmt::Exit => writeln!(out, "{pad}EXIT;"),
-            Stmt::Continue => writeln!(out, "{pad}CONTINUE;"),
-            Stmt::Return => writeln!(out, "{pad}RETURN;"),
-        };
+            Stmt::Do(unit, args) => {
+                self.call_function(*unit, args);
+                self.line(";");
+            }
+            Stmt::Exit => self.line("EXIT;"),
+            Stmt::Continue => self.line("CONTINUE;"),
+            Stmt::Return => self.line("RETURN;"),
+        }
+    }
+
+    fn labels(&mut self, ty: Ty, labels: &[(i128, i128)], depth: usize) {
+        let mut texts = Vec::new();
+        for (low, high) in labels {
+            let from = self.style.literal(self.source, ty, &Value::Int(*low), false);
+            let to = self.style.literal(self.source, ty, &Value::Int(*high), false);
+            texts.push(if low == high { from } else { format!("{from}..{to}") });
+        }
+        self.begin(depth, &format!("{}:\n", texts.join(", ")));
+    }
+
+    fn otherwise(&mut self, otherwise: &[Stmt], depth: usize) {
+        if !otherwise.is_empty() {
+            self.begin(depth, "ELSE\n");
+            self.list(otherwise, depth + 1);
+        }
+    }
+
+    fn if_statement(&mut self, branches: &[(Expr, Vec<Stmt>)], otherwise: &[Stmt], depth: usize) {
+        for (at, (condition, body)) in branches.iter().enumerate() {
+            if at == 0 {
+                self.put("IF ");
+            } else {
+                self.begin(depth, "ELSIF ");
+            }
+            self.expr(condition, 0);
+            self.line(" THEN");
+            self.list(body, depth + 1);
+        }
+        self.otherwise(otherwise, depth);
+        self.begin(depth, "END_IF;\n");
+    }
+
+    /// A loop; the keyword's line has been begun.
+    fn loop_statement(&mut self, stmt: &Stmt, depth: usize) {
+        match stmt {
+            Stmt::For(control, from, to, by, body) => {
+                self.put("FOR ");
+                self.var_name(*control);
+                self.put(" := ");
+                self.expr(from, 0);
+                self.put(" TO ");
+                self.expr(to, 0);
+                if let Some(by) = by {
+                    self.put(" BY ");
+                    self.expr(by, 0);
+                }
+                self.line(" DO");
+                self.list(body, depth + 1);
+                self.begin(depth, "END_FOR;\n");
+            }
+            Stmt::While(counter, limit, condition, body) => {
+                let name = self.unit.map_or("?", |unit| unit.vars[*counter].name.as_str());
+                self.line(&format!("{name} := 0;"));
+                // The condition is not looked at when the counter is at its end.
+                self.begin(depth, &format!("WHILE {name} < {limit} AND_THEN "));
+                self.enclosed(condition);
+                self.line(" DO");
+                self.begin(depth, &format!("  {name} := {name} + 1;\n"));
+                self.list(body, depth + 1);
+                self.begin(depth, "END_WHILE;\n");
+            }
+            Stmt::Repeat(counter, limit, condition, body) => {
+                let name = self.unit.map_or("?", |unit| unit.vars[*counter].name.as_str());
+                self.line(&format!("{name} := 0;"));
+                self.begin(depth, "REPEAT\n");
+                self.begin(depth, &format!("  {name} := {name} + 1;\n"));
+                self.list(body, depth + 1);
+                self.begin(depth, &format!("UNTIL {name} >= {limit} OR_ELSE "));
+                self.enclosed(condition);
+                self.line(" END_REPEAT;");
+            }
+            _ => {}
+        }
     }
 }

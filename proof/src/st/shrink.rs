@@ -5,7 +5,7 @@
 
 use super::case::{Case, Round};
 use super::sweep::{drop_field, drop_inputs_of, drop_parameter, drop_values_of, take_out, unused, uses_field};
-use super::tree::{Arg, Class, Def, Expr, ExprKind, Kind, Place, Source, Step, Stmt, Ty, Value};
+use super::tree::{Arg, Class, Def, Expr, ExprKind, Kind, Place, Source, Step, Stmt, Ty, UnitKind, Value};
 use super::visit::{bodies, bodies_mut};
 
 /// Makes a program small without rounds of its own.
@@ -36,7 +36,13 @@ type Stage = fn(&mut Editor, &mut Case);
 
 /// Coarse to fine.
 const STAGES: &[Stage] = &[
-    |editor, case| editor.rounds(&mut case.rounds),
+    |editor, case| {
+        if case.source.style != 0 && editor.here() {
+            case.source.style = 0;
+        }
+        editor.rounds(&mut case.rounds);
+        editor.configuration(&mut case.source);
+    },
     |editor, case| editor.each_body(&mut case.source, Editor::chunks),
     |editor, case| editor.each_body(&mut case.source, Editor::list),
     |editor, case| {
@@ -138,6 +144,42 @@ impl Editor {
         }
     }
 
+    /// The configuration itself, its instances and tasks, connections, and the startup function.
+    fn configuration(&mut self, source: &mut Source) {
+        // The program of the only instance can run alone; behind it stand only other programs.
+        let only =
+            source.config.as_ref().filter(|config| config.instances.len() == 1).map(|config| config.instances[0].unit);
+        if let Some(program) = only.filter(|_| self.here()) {
+            source.config = None;
+            source.units.truncate(program + 1);
+            let others = source.units[..program].iter_mut().filter(|unit| unit.kind == UnitKind::Program);
+            others.for_each(|unit| unit.gone = true);
+            return;
+        }
+        let Some(config) = &mut source.config else { return };
+        if config.startup.is_some() && self.here() {
+            config.startup = None;
+        }
+        for at in (0..config.instances.len()).rev() {
+            if config.instances.len() > 1 && self.here() {
+                config.instances.remove(at);
+                return;
+            }
+        }
+        for at in (0..config.tasks.len()).rev() {
+            let is_used = config.instances.iter().any(|instance| instance.task == Some(at));
+            if !is_used && self.here() {
+                config.tasks.remove(at);
+                let behind = config.instances.iter_mut().filter_map(|instance| instance.task.as_mut());
+                behind.filter(|task| **task > at).for_each(|task| *task -= 1);
+                return;
+            }
+        }
+        for instance in &mut config.instances {
+            self.args(&mut instance.args);
+        }
+    }
+
     /// Shows every list of statements to `edits`, outer ones first, of later units first.
     fn each_body(&mut self, source: &mut Source, edits: fn(&mut Editor, &mut Vec<Stmt>)) {
         for unit in source.units.iter_mut().rev().filter(|unit| !unit.gone) {
@@ -213,7 +255,7 @@ impl Editor {
                     *limit = 1;
                 }
             }
-            Stmt::Assign(..) | Stmt::Call(..) | Stmt::Exit | Stmt::Continue | Stmt::Return => {}
+            Stmt::Assign(..) | Stmt::Call(..) | Stmt::Do(..) | Stmt::Exit | Stmt::Continue | Stmt::Return => {}
         }
     }
 
@@ -281,7 +323,7 @@ impl Editor {
                         }
                     }
                 }
-                Def::Enum(values) => self.one_less(values),
+                Def::Enum(_, values) => self.one_less(values),
                 Def::Struct(fields) => {
                     for at in 0..fields.len() {
                         if fields.len() > 1 && !uses_field(source, id, at) && self.here() {
@@ -355,6 +397,7 @@ impl Editor {
                     self.place(place);
                     self.args(args);
                 }
+                Stmt::Do(_, args) => self.args(args),
                 Stmt::Exit | Stmt::Continue | Stmt::Return => {}
             }
             if self.done {
@@ -372,8 +415,8 @@ impl Editor {
         }
         for arg in args {
             match arg {
-                Arg::In(_, value) => self.expr(value),
-                Arg::InOut(_, place) | Arg::Out(_, place) => self.place(place),
+                Arg::In(_, value) | Arg::En(value) => self.expr(value),
+                Arg::InOut(_, place) | Arg::Out(_, place) | Arg::Eno(place) => self.place(place),
             }
         }
     }

@@ -23,8 +23,25 @@ pub(crate) enum Declaration {
 pub(crate) fn unused(source: &Source) -> Vec<Declaration> {
     let mut used = Used { source, found: BTreeSet::new(), open: Vec::new() };
     for (number, unit) in source.units.iter().enumerate() {
-        if unit.kind == UnitKind::Program && !unit.gone {
+        if source.config.is_none() && unit.kind == UnitKind::Program && !unit.gone {
             used.declaration(Declaration::Unit(number));
+        }
+    }
+    if let Some(config) = &source.config {
+        config.startup.iter().for_each(|unit| used.declaration(Declaration::Unit(*unit)));
+        let waits = config.tasks.iter().filter_map(|task| task.single);
+        waits.for_each(|global| used.declaration(Declaration::Global(global)));
+        for instance in &config.instances {
+            used.declaration(Declaration::Unit(instance.unit));
+            used.args(instance.unit, &instance.args);
+            for arg in &instance.args {
+                if let Arg::In(_, Expr { kind: ExprKind::Get(place), .. }) | Arg::InOut(_, place) | Arg::Out(_, place) =
+                    arg
+                    && let Base::Global(at) = place.base
+                {
+                    used.declaration(Declaration::Global(at));
+                }
+            }
         }
     }
     while let Some(unit) = used.open.pop() {
@@ -77,7 +94,7 @@ impl Used<'_> {
                 Def::Struct(fields) => fields.iter().for_each(|(_, ty, _)| self.ty(*ty)),
                 Def::Array(_, element) => self.ty(*element),
                 Def::Block(unit) => self.declaration(Declaration::Unit(*unit)),
-                Def::Enum(_) | Def::Subrange(..) | Def::Standard(_) => {}
+                Def::Enum(..) | Def::Subrange(..) | Def::Standard(_) => {}
             },
         }
     }
@@ -101,6 +118,10 @@ impl Used<'_> {
                     self.args(callee, args);
                 }
             }
+            Node::Stmt(Stmt::Do(callee, args)) => {
+                self.declaration(Declaration::Unit(*callee));
+                self.args(*callee, args);
+            }
             Node::Stmt(_) => {}
             Node::Expr(Expr { kind: ExprKind::Call(callee, args), .. }) => {
                 self.declaration(Declaration::Unit(*callee));
@@ -108,10 +129,11 @@ impl Used<'_> {
             }
             Node::Expr(expr) => self.ty(expr.ty),
             Node::Place(place) => {
-                self.declaration(match place.base {
-                    Base::Var(at) => Declaration::Var(unit, at),
-                    Base::Global(at) => Declaration::Global(at),
-                });
+                match place.base {
+                    Base::Var(at) => self.declaration(Declaration::Var(unit, at)),
+                    Base::Global(at) => self.declaration(Declaration::Global(at)),
+                    Base::Direct(_) => {}
+                }
                 let mut ty = source.base(&source.units[unit], place);
                 for step in &place.steps {
                     if let (Step::Field(at), Ty::N(id)) = (step, ty)
@@ -127,8 +149,7 @@ impl Used<'_> {
 
     fn args(&mut self, callee: usize, args: &[Arg]) {
         for arg in args {
-            let (Arg::In(at, _) | Arg::InOut(at, _) | Arg::Out(at, _)) = arg;
-            self.declaration(Declaration::Var(callee, *at));
+            parameter(arg).into_iter().for_each(|at| self.declaration(Declaration::Var(callee, at)));
         }
     }
 }
@@ -140,18 +161,26 @@ pub(crate) fn drop_parameter(source: &mut Source, unit: usize, at: usize) {
         .filter(|id| matches!(source.types[*id].def, Def::Block(of) if of == unit))
         .map(Ty::N)
         .collect();
+    for instance in source.config.iter_mut().flat_map(|config| &mut config.instances) {
+        if instance.unit == unit {
+            instance.args.retain(|arg| parameter(arg) != Some(at));
+        }
+    }
     for caller in &mut source.units {
         change(&mut caller.body, &mut |node| match node {
-            Change::Function(callee, args) if callee == unit => args.retain(|arg| parameter(arg) != at),
-            Change::Block(ty, args) if blocks.contains(&ty) => args.retain(|arg| parameter(arg) != at),
+            Change::Function(callee, args) if callee == unit => args.retain(|arg| parameter(arg) != Some(at)),
+            Change::Block(ty, args) if blocks.contains(&ty) => args.retain(|arg| parameter(arg) != Some(at)),
             Change::Function(..) | Change::Block(..) | Change::Place(_) => {}
         });
     }
 }
 
-fn parameter(arg: &Arg) -> usize {
-    let (Arg::In(at, _) | Arg::InOut(at, _) | Arg::Out(at, _)) = arg;
-    *at
+/// The parameter of an argument; EN and ENO are none that a unit declares.
+fn parameter(arg: &Arg) -> Option<usize> {
+    match arg {
+        Arg::In(at, _) | Arg::InOut(at, _) | Arg::Out(at, _) => Some(*at),
+        Arg::En(_) | Arg::Eno(_) => None,
+    }
 }
 
 /// Whether a place steps into a field of a structure.
@@ -225,6 +254,6 @@ fn contains(source: &Source, ty: Ty, id: usize) -> bool {
         || match &source.types[own].def {
             Def::Struct(fields) => fields.iter().any(|(_, ty, _)| contains(source, *ty, id)),
             Def::Array(_, element) => contains(source, *element, id),
-            Def::Enum(_) | Def::Subrange(..) | Def::Block(_) | Def::Standard(_) => false,
+            Def::Enum(..) | Def::Subrange(..) | Def::Block(_) | Def::Standard(_) => false,
         }
 }

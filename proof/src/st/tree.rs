@@ -20,11 +20,12 @@ pub enum Kind {
     Real,
     Lreal,
     Time,
+    Ltime,
 }
 
 impl Kind {
     /// All of them.
-    pub const ALL: [Kind; 16] = [
+    pub const ALL: [Kind; 17] = [
         Kind::Bool,
         Kind::Sint,
         Kind::Int,
@@ -41,6 +42,7 @@ impl Kind {
         Kind::Real,
         Kind::Lreal,
         Kind::Time,
+        Kind::Ltime,
     ];
     /// SINT to ULINT.
     pub const INTEGERS: [Kind; 8] =
@@ -51,9 +53,9 @@ impl Kind {
     /// Its keyword.
     #[must_use]
     pub fn name(self) -> &'static str {
-        const NAMES: [&str; 16] = [
+        const NAMES: [&str; 17] = [
             "BOOL", "SINT", "INT", "DINT", "LINT", "USINT", "UINT", "UDINT", "ULINT", "BYTE", "WORD", "DWORD", "LWORD",
-            "REAL", "LREAL", "TIME",
+            "REAL", "LREAL", "TIME", "LTIME",
         ];
         NAMES[self as usize]
     }
@@ -61,13 +63,13 @@ impl Kind {
     /// Width in bits; of BOOL 1.
     #[must_use]
     pub fn bits(self) -> u32 {
-        [1, 8, 16, 32, 64, 8, 16, 32, 64, 8, 16, 32, 64, 32, 64, 64][self as usize]
+        [1, 8, 16, 32, 64, 8, 16, 32, 64, 8, 16, 32, 64, 32, 64, 64, 64][self as usize]
     }
 
-    /// SINT to LINT, TIME.
+    /// SINT to LINT, TIME and LTIME.
     #[must_use]
     pub fn is_signed(self) -> bool {
-        matches!(self, Kind::Sint | Kind::Int | Kind::Dint | Kind::Lint | Kind::Time)
+        matches!(self, Kind::Sint | Kind::Int | Kind::Dint | Kind::Lint | Kind::Time | Kind::Ltime)
     }
 
     /// SINT to ULINT.
@@ -104,23 +106,66 @@ impl Kind {
         if self.is_signed() && pattern >> (bits - 1) == 1 { pattern - (1 << bits) } else { pattern }
     }
 
-    /// What the standard converts to this type by itself.
+    /// TIME and LTIME.
     #[must_use]
-    pub fn narrower(self) -> &'static [Kind] {
-        match self {
-            Kind::Int => &[Kind::Sint, Kind::Usint],
-            Kind::Dint => &[Kind::Sint, Kind::Int, Kind::Usint, Kind::Uint],
-            Kind::Lint => &[Kind::Sint, Kind::Int, Kind::Dint, Kind::Usint, Kind::Uint, Kind::Udint],
-            Kind::Uint => &[Kind::Usint],
-            Kind::Udint => &[Kind::Usint, Kind::Uint],
-            Kind::Ulint => &[Kind::Usint, Kind::Uint, Kind::Udint],
-            Kind::Word => &[Kind::Byte],
-            Kind::Dword => &[Kind::Byte, Kind::Word],
-            Kind::Lword => &[Kind::Byte, Kind::Word, Kind::Dword],
-            Kind::Real => &[Kind::Sint, Kind::Int, Kind::Usint, Kind::Uint],
-            Kind::Lreal => &[Kind::Sint, Kind::Int, Kind::Dint, Kind::Usint, Kind::Uint, Kind::Udint, Kind::Real],
-            _ => &[],
+    pub fn is_duration(self) -> bool {
+        matches!(self, Kind::Time | Kind::Ltime)
+    }
+
+    /// Whether a value of this type becomes one of another by itself: what the standard's figure has, and between numbers of any width
+    /// what vendors have besides. Integers keep their low bits, an LREAL is rounded.
+    #[must_use]
+    pub fn becomes(self, to: Kind) -> bool {
+        let whole = |kind: Kind| kind.is_integer() || kind.is_bits();
+        self == to
+            || (whole(self) && whole(to))
+            || (self.is_integer() && to.is_real())
+            || (self.is_real() && to.is_real())
+            || (self == Kind::Bool && to.is_bits())
+            || (self == Kind::Time && to == Kind::Ltime)
+    }
+
+    /// The type in which the operands of an operation meet. Integers meet in the wider one, and in a signed one that holds both while
+    /// there is one; a bit string and an integer in the wider one, of equals in the bit string; an integer and a float in the float if it holds every
+    /// value of the integer, else in LREAL.
+    #[must_use]
+    pub fn meet(self, other: Kind) -> Option<Kind> {
+        if self == other {
+            return Some(self);
         }
+        let pair = |test: fn(Kind) -> bool| match (test(self), test(other)) {
+            (true, false) => Some((self, other)),
+            (false, true) => Some((other, self)),
+            _ => None,
+        };
+        if self.is_duration() && other.is_duration() {
+            return Some(Kind::Ltime);
+        }
+        if self.is_real() && other.is_real() {
+            return Some(Kind::Lreal);
+        }
+        if let Some((real, number)) = pair(Kind::is_real) {
+            let fits = number.is_integer() && number.bits() <= if real == Kind::Real { 16 } else { 64 };
+            return number.is_integer().then_some(if fits { real } else { Kind::Lreal });
+        }
+        if let Some((_, bits)) = pair(|kind| kind == Kind::Bool) {
+            return bits.is_bits().then_some(bits);
+        }
+        let whole = |kind: Kind| kind.is_integer() || kind.is_bits();
+        if !whole(self) || !whole(other) {
+            return None;
+        }
+        let wider = if self.bits() >= other.bits() { self } else { other };
+        if let Some((bits, integer)) = pair(Kind::is_bits) {
+            return Some(if integer.bits() > bits.bits() { integer } else { bits });
+        }
+        let Some((signed, unsigned)) = pair(Kind::is_signed).filter(|_| self.is_integer()) else { return Some(wider) };
+        Some(match unsigned.bits() {
+            bits if signed.bits() > bits => signed,
+            8 => Kind::Int,
+            16 => Kind::Dint,
+            _ => Kind::Lint,
+        })
     }
 }
 
@@ -181,8 +226,8 @@ impl Value {
 pub enum Def {
     /// STRUCT: names, types, initial values.
     Struct(Vec<(String, Ty, Option<Value>)>),
-    /// Names and values; the base is INT.
-    Enum(Vec<(String, i64)>),
+    /// The base type if one is written (else it is INT), names and values.
+    Enum(Option<Kind>, Vec<(String, i64)>),
     /// Base and limits.
     Subrange(Kind, i128, i128),
     /// Bounds and element; declared where it is used when it has no name.
@@ -202,6 +247,26 @@ pub struct Type {
     pub def: Def,
     /// The shrinker took its declaration out.
     pub gone: bool,
+}
+
+/// Which part of the process image.
+#[allow(missing_docs, reason = "the names are the standard's")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Area {
+    Input,
+    Output,
+    Memory,
+}
+
+/// An address in the process image.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct At {
+    /// Which part.
+    pub area: Area,
+    /// Byte in it; of anything wider than a byte a multiple of its size.
+    pub byte: usize,
+    /// Bit in the byte, of a BOOL.
+    pub bit: usize,
 }
 
 /// Where a variable is declared.
@@ -231,8 +296,20 @@ pub struct Var {
     pub init: Option<Value>,
     /// A counter of a loop, which only the loop writes.
     pub reserved: bool,
+    /// Its address, if it lies in the process image.
+    pub at: Option<At>,
+    /// Declared RETAIN.
+    pub retain: bool,
     /// The shrinker took its declaration out.
     pub gone: bool,
+}
+
+impl Var {
+    /// Whether a dump shows it under its own name.
+    #[must_use]
+    pub fn is_shown(&self) -> bool {
+        matches!(self.class, Class::Input | Class::Output | Class::Var) && self.at.is_none() && !self.gone
+    }
 }
 
 /// Which POU.
@@ -251,7 +328,7 @@ pub struct Unit {
     pub name: String,
     /// Which.
     pub kind: UnitKind,
-    /// Its variables; of a function the first is the result.
+    /// Its variables; of a function that has a result the first.
     pub vars: Vec<Var>,
     /// Its statements.
     pub body: Vec<Stmt>,
@@ -259,7 +336,44 @@ pub struct Unit {
     pub gone: bool,
 }
 
-/// A program with what belongs to it; the last unit is the PROGRAM.
+/// A TASK.
+#[derive(Debug, Clone)]
+pub struct Task {
+    /// Its name.
+    pub name: String,
+    /// INTERVAL in microseconds; none: it waits for its SINGLE alone.
+    pub interval_us: Option<u64>,
+    /// SINGLE: a global BOOL.
+    pub single: Option<usize>,
+    /// PRIORITY; 0 comes first.
+    pub priority: u16,
+}
+
+/// A program instance.
+#[derive(Debug, Clone)]
+pub struct Instance {
+    /// Its name.
+    pub name: String,
+    /// Position of its task; none: it runs in every round, last.
+    pub task: Option<usize>,
+    /// Its PROGRAM.
+    pub unit: usize,
+    /// Its connections: literals and globals.
+    pub args: Vec<Arg>,
+}
+
+/// A CONFIGURATION.
+#[derive(Debug, Clone)]
+pub struct Config {
+    /// Its tasks, in the order of declaration.
+    pub tasks: Vec<Task>,
+    /// Its program instances, in the order of declaration.
+    pub instances: Vec<Instance>,
+    /// The function that runs before the first round.
+    pub startup: Option<usize>,
+}
+
+/// A program with what belongs to it; the last unit is a PROGRAM, without a [`Config`] the only one.
 #[derive(Debug, Clone, Default)]
 pub struct Source {
     /// Types, each after those it is made of.
@@ -268,6 +382,10 @@ pub struct Source {
     pub globals: Vec<Var>,
     /// POUs, each after those it calls.
     pub units: Vec<Unit>,
+    /// Which task runs what; none: the last unit runs alone.
+    pub config: Option<Config>,
+    /// Bits that decide how things are spelt that can be spelt in several ways.
+    pub style: u64,
 }
 
 /// Where a place begins.
@@ -277,6 +395,8 @@ pub enum Base {
     Var(usize),
     /// A global.
     Global(usize),
+    /// An address without a declaration.
+    Direct(At),
 }
 
 /// A step into a composite.
@@ -286,6 +406,8 @@ pub enum Step {
     Field(usize),
     /// Element of an array.
     Index(Vec<Expr>),
+    /// Bits of an integer or bit string: the first, and how many (1, 8, 16, 32).
+    Part(u32, u32),
 }
 
 /// A variable or a part of one.
@@ -319,6 +441,8 @@ pub enum Op {
     Le,
     Gt,
     Ge,
+    /// `**`
+    Pow,
 }
 
 /// An expression.
@@ -339,6 +463,10 @@ pub enum Arg {
     InOut(usize, Place),
     /// `p => place`
     Out(usize, Place),
+    /// `EN := e`
+    En(Expr),
+    /// `ENO => place`
+    Eno(Place),
 }
 
 /// What an expression is.
@@ -386,6 +514,8 @@ pub enum Stmt {
     Repeat(usize, i64, Expr, Vec<Stmt>),
     /// A call of a block.
     Call(Place, Vec<Arg>),
+    /// A call of a function of the program for its effects.
+    Do(usize, Vec<Arg>),
     /// EXIT
     Exit,
     /// CONTINUE
@@ -415,7 +545,7 @@ impl Source {
                         |(_, ty, init): &(String, Ty, Option<Value>)| init.clone().unwrap_or_else(|| self.initial(*ty));
                     Value::Many(fields.iter().map(value).collect())
                 }
-                Def::Enum(values) => Value::Int(i128::from(values[0].1)),
+                Def::Enum(_, values) => Value::Int(i128::from(values[0].1)),
                 Def::Subrange(_, low, _) => Value::Int(*low),
                 Def::Array(dims, element) => Value::Many(vec![self.initial(*element); Source::elements(dims)]),
                 Def::Block(unit) => self.instance(*unit),
@@ -454,6 +584,8 @@ impl Source {
         match place.base {
             Base::Var(at) => unit.vars[at].ty,
             Base::Global(at) => self.globals[at].ty,
+            // Nothing but a part of its bits is behind an address.
+            Base::Direct(_) => place.ty,
         }
     }
 
@@ -463,14 +595,66 @@ impl Source {
     /// When there is nothing to step into: the tree is wrong.
     #[must_use]
     pub fn behind(&self, ty: Ty, step: &Step) -> Ty {
+        if let Step::Part(_, count) = step {
+            let kinds = [Kind::Bool, Kind::Byte, Kind::Word, Kind::Dword];
+            return kinds.into_iter().find(|kind| kind.bits() == *count).map_or(ty, Ty::K);
+        }
         let Ty::N(id) = ty else { panic!("a step into {ty:?}") };
         match (step, &self.types[id].def) {
-            (Step::Field(at), Def::Struct(fields)) => fields[*at].1,
-            (Step::Field(at), Def::Block(unit)) => self.units[*unit].vars[*at].ty,
-            (Step::Field(at), Def::Standard(standard)) => Ty::K(standard.fields()[*at].1),
+            (Step::Field(at), def) => self.field_type(def, *at),
             (Step::Index(_), Def::Array(_, element)) => *element,
             (step, def) => panic!("{step:?} into {def:?}"),
         }
+    }
+
+    /// Name, unit and connections of every program instance.
+    #[must_use]
+    pub fn programs(&self) -> Vec<(&str, usize, &[Arg])> {
+        match &self.config {
+            Some(config) => {
+                config.instances.iter().map(|one| (one.name.as_str(), one.unit, one.args.as_slice())).collect()
+            }
+            None => {
+                self.units.last().map(|unit| (unit.name.as_str(), self.units.len() - 1, &[][..])).into_iter().collect()
+            }
+        }
+    }
+
+    /// The type of a field of a structure or a variable of a block.
+    ///
+    /// # Panics
+    /// When the tree is wrong.
+    #[must_use]
+    pub fn field_type(&self, def: &Def, at: usize) -> Ty {
+        match def {
+            Def::Struct(fields) => fields[at].1,
+            Def::Block(unit) => self.units[*unit].vars[at].ty,
+            Def::Standard(standard) => Ty::K(standard.fields()[at].1),
+            other => panic!("no field of {other:?}"),
+        }
+    }
+
+    /// The values of [`Source::leaves`] alone, in the same order.
+    pub fn leaf_values<'v>(&self, ty: Ty, value: &'v Value, found: &mut Vec<&'v Value>) {
+        let (Ty::N(id), Value::Many(parts)) = (ty, value) else {
+            found.push(value);
+            return;
+        };
+        match &self.types[id].def {
+            Def::Struct(fields) => {
+                fields.iter().zip(parts).for_each(|((_, ty, _), part)| self.leaf_values(*ty, part, found));
+            }
+            Def::Array(_, element) => parts.iter().for_each(|part| self.leaf_values(*element, part, found)),
+            Def::Block(unit) => self.unit_leaf_values(*unit, parts, found),
+            Def::Standard(standard) => found.extend(parts.iter().take(standard.fields().len())),
+            Def::Enum(..) | Def::Subrange(..) => {}
+        }
+    }
+
+    /// The same of a unit's variables.
+    pub fn unit_leaf_values<'v>(&self, unit: usize, parts: &'v [Value], found: &mut Vec<&'v Value>) {
+        let shown = self.units[unit].vars.iter().zip(parts).filter(|(var, _)| var.is_shown());
+        shown.for_each(|(var, part)| self.leaf_values(var.ty, part, found));
     }
 
     /// Paths, types and values of all parts of a value that are no composites and that a dump shows.
@@ -503,14 +687,14 @@ impl Source {
                     self.leaves(&format!("{path}.{name}"), Ty::K(*kind), part, found);
                 }
             }
-            Def::Enum(_) | Def::Subrange(..) => {}
+            Def::Enum(..) | Def::Subrange(..) => {}
         }
     }
 
     /// The same of a unit's variables.
     pub fn unit_leaves(&self, path: &str, unit: usize, parts: &[Value], found: &mut Vec<(String, Ty, Value)>) {
         for (var, part) in self.units[unit].vars.iter().zip(parts) {
-            if matches!(var.class, Class::Input | Class::Output | Class::Var) && !var.gone {
+            if var.is_shown() {
                 self.leaves(&format!("{path}.{}", var.name), var.ty, part, found);
             }
         }

@@ -30,6 +30,7 @@ pub(crate) fn each<'t>(list: &'t [Stmt], see: &mut dyn FnMut(Node<'t>)) {
                 each_in_place(place, see);
                 each_in_args(args, see);
             }
+            Stmt::Do(_, args) => each_in_args(args, see),
             Stmt::Exit | Stmt::Continue | Stmt::Return => {}
         }
         bodies(stmt).into_iter().for_each(|body| each(body, see));
@@ -56,8 +57,8 @@ pub(crate) fn each_in_expr<'t>(expr: &'t Expr, see: &mut dyn FnMut(Node<'t>)) {
 fn each_in_args<'t>(args: &'t [Arg], see: &mut dyn FnMut(Node<'t>)) {
     for arg in args {
         match arg {
-            Arg::In(_, value) => each_in_expr(value, see),
-            Arg::InOut(_, place) | Arg::Out(_, place) => each_in_place(place, see),
+            Arg::In(_, value) | Arg::En(value) => each_in_expr(value, see),
+            Arg::InOut(_, place) | Arg::Out(_, place) | Arg::Eno(place) => each_in_place(place, see),
         }
     }
 }
@@ -78,7 +79,7 @@ pub(crate) fn bodies(stmt: &Stmt) -> Vec<&Vec<Stmt>> {
         Stmt::If(branches, otherwise) => branches.iter().map(|(_, body)| body).chain([otherwise]).collect(),
         Stmt::Case(_, branches, otherwise) => branches.iter().map(|(_, body)| body).chain([otherwise]).collect(),
         Stmt::For(.., body) | Stmt::While(.., body) | Stmt::Repeat(.., body) => vec![body],
-        Stmt::Assign(..) | Stmt::Call(..) | Stmt::Exit | Stmt::Continue | Stmt::Return => Vec::new(),
+        Stmt::Assign(..) | Stmt::Call(..) | Stmt::Do(..) | Stmt::Exit | Stmt::Continue | Stmt::Return => Vec::new(),
     }
 }
 
@@ -88,7 +89,7 @@ pub(crate) fn bodies_mut(stmt: &mut Stmt) -> Vec<&mut Vec<Stmt>> {
         Stmt::If(branches, otherwise) => branches.iter_mut().map(|(_, body)| body).chain([otherwise]).collect(),
         Stmt::Case(_, branches, otherwise) => branches.iter_mut().map(|(_, body)| body).chain([otherwise]).collect(),
         Stmt::For(.., body) | Stmt::While(.., body) | Stmt::Repeat(.., body) => vec![body],
-        Stmt::Assign(..) | Stmt::Call(..) | Stmt::Exit | Stmt::Continue | Stmt::Return => Vec::new(),
+        Stmt::Assign(..) | Stmt::Call(..) | Stmt::Do(..) | Stmt::Exit | Stmt::Continue | Stmt::Return => Vec::new(),
     }
 }
 
@@ -121,6 +122,10 @@ pub(crate) fn change(list: &mut [Stmt], with: &mut dyn FnMut(Change<'_>)) {
                 change_args(args, with);
                 with(Change::Block(place.ty, args));
             }
+            Stmt::Do(unit, args) => {
+                change_args(args, with);
+                with(Change::Function(*unit, args));
+            }
             Stmt::Exit | Stmt::Continue | Stmt::Return => {}
         }
         bodies_mut(stmt).into_iter().for_each(|body| change(body, with));
@@ -148,8 +153,8 @@ fn change_expr(expr: &mut Expr, with: &mut dyn FnMut(Change<'_>)) {
 fn change_args(args: &mut [Arg], with: &mut dyn FnMut(Change<'_>)) {
     for arg in args {
         match arg {
-            Arg::In(_, value) => change_expr(value, with),
-            Arg::InOut(_, place) | Arg::Out(_, place) => change_place(place, with),
+            Arg::In(_, value) | Arg::En(value) => change_expr(value, with),
+            Arg::InOut(_, place) | Arg::Out(_, place) | Arg::Eno(place) => change_place(place, with),
         }
     }
 }

@@ -6,26 +6,47 @@ use std::sync::Arc;
 
 use khz_bytecode::container::{Container, SystemVariableKind};
 use khz_bytecode::trap::TrapCode;
-use khz_bytecode::verify::verify;
-use khz_frontend::{CompileOptions, SourceInput};
-use khz_machine::engine::{DeadlineCell, Engine, Entry, Limits};
+use khz_bytecode::verify::{Verified, verify};
+use khz_jit::{Jit, JitOptions};
+use khz_machine::engine::{DeadlineCell, Engine, Entry, Fuel, Limits};
 use khz_machine::image::{Image, ImageLayout};
-use khz_machine::trap::Trap;
+use khz_machine::report::describe;
+use khz_machine::trap::{CodePlace, Trap};
 use khz_machine::variables::{Variable, VariableTable, VariableValue};
 use khz_proof::campaign::Figures;
 use khz_proof::random::Random;
+use khz_proof::st::coverage::Coverage;
 use khz_proof::st::evaluate::{Evaluator, Stop};
-use khz_proof::st::generate;
-use khz_proof::st::print::print;
+use khz_proof::st::position::Positions;
+use khz_proof::st::print::{print, print_positions};
+use khz_proof::st::rounds::Rounds;
 use khz_proof::st::shrink::shrink;
-use khz_proof::st::tree::{Def, Kind, Source, Ty, Value};
+use khz_proof::st::tree::{Def, Source, Ty, Value};
+use khz_proof::st::{Size, generate};
+use khz_scheduler::{Hooks, LoadOptions, NoInputs, NoIo, NoObserver, Resource, Running, VirtualClock};
 
-/// Scans of a program.
-pub const SCANS: u64 = 4;
 /// What the compiler may say of a generated program: constants alone divide by zero, index outside the bounds, or leave a subrange.
 const REFUSED: [&str; 3] = ["refused T0007", "refused T0006", "refused T0008"];
 const STEPS: u64 = 100_000;
+const FUEL: u64 = 1 << 40;
 const IMAGE_LIMIT_BYTES: u64 = 1 << 22;
+
+/// How much is done with each program.
+#[derive(Debug, Clone, Copy)]
+pub struct Plan {
+    /// Scans or rounds.
+    pub scans: u64,
+    /// One of how many programs is also run by code that charges fuel, which does not end.
+    pub fuel: u64,
+    /// Of one of how many programs it is noted which passes of native code changed something.
+    pub passes: u64,
+}
+
+impl Default for Plan {
+    fn default() -> Self {
+        Plan { scans: 10, fuel: 4, passes: 16 }
+    }
+}
 
 /// What a search reached.
 #[derive(Default)]
@@ -37,9 +58,13 @@ pub struct Tally {
     pub unused: u64,
     /// Refused because the compiler saw a trap that constants alone make, which the generator does not look for.
     pub refused: u64,
+    /// Programs that code with fuel ran too.
+    pub with_fuel: u64,
+    /// Programs whose passes were noted, and of how many each pass changed something.
+    pub noted: u64,
+    pub passes: BTreeMap<&'static str, u64>,
     pub traps: BTreeMap<String, u64>,
-    /// Programs with a word of the language in their text.
-    pub words: BTreeMap<String, u64>,
+    pub coverage: Coverage,
 }
 
 impl Figures for Tally {
@@ -50,33 +75,30 @@ impl Figures for Tally {
         self.too_long += later.too_long;
         self.unused += later.unused;
         self.refused += later.refused;
+        self.with_fuel += later.with_fuel;
+        self.noted += later.noted;
+        later.passes.into_iter().for_each(|(name, count)| *self.passes.entry(name).or_default() += count);
         later.traps.into_iter().for_each(|(name, count)| *self.traps.entry(name).or_default() += count);
-        later.words.into_iter().for_each(|(name, count)| *self.words.entry(name).or_default() += count);
+        self.coverage.merge(later.coverage);
     }
 }
 
 impl Tally {
     pub fn report(&self) -> String {
         format!(
-            "{} programs, {} scans, {} values compared, {} without an end in time, {} values of unused globals, {} refused for a constant trap\ntraps {:?}\nprograms with {:?}",
-            self.programs, self.scans, self.values, self.too_long, self.unused, self.refused, self.traps, self.words
+            "{} programs, {} scans, {} values compared, {} without an end in time, {} values of unused globals, {} refused for a constant trap, {} with fuel too\ntraps {:?}\npasses of {} programs {:?}\n{}",
+            self.programs,
+            self.scans,
+            self.values,
+            self.too_long,
+            self.unused,
+            self.refused,
+            self.with_fuel,
+            self.traps,
+            self.noted,
+            self.passes,
+            self.coverage.report()
         )
-    }
-
-    fn words(&mut self, text: &str) {
-        let mut found: Vec<&str> = text.split(|c: char| !c.is_ascii_alphanumeric() && c != '_').collect();
-        found.sort_unstable();
-        found.dedup();
-        for word in
-            found.into_iter().filter(|word| word.len() > 1 && word.starts_with(|c: char| c.is_ascii_uppercase()))
-        {
-            let own =
-                ["Enum", "Struct", "Array", "Range", "Block", "Holder"].iter().find(|own| word.starts_with(**own));
-            let is_hex = word != "ADD" && word.bytes().all(|byte| byte.is_ascii_hexdigit());
-            if (word == word.to_ascii_uppercase() && !is_hex) || own.is_some() {
-                *self.words.entry(own.map_or(word, |own| own).to_string()).or_default() += 1;
-            }
-        }
     }
 }
 
@@ -92,9 +114,10 @@ fn found(class: impl Into<String>, text: impl Into<String>) -> Found {
 }
 
 struct Machine {
-    name: &'static str,
+    name: String,
     engine: Box<dyn Engine>,
     image: Image,
+    fuel: bool,
 }
 
 /// The one NaN for all.
@@ -111,7 +134,7 @@ fn same(source: &Source, ty: Ty, wanted: &Value, got: &VariableValue) -> bool {
         (Value::Str(a), VariableValue::String(b)) => a == b,
         (Value::Int(a), VariableValue::Named(name)) => match ty {
             Ty::N(id) => match &source.types[id].def {
-                Def::Enum(values) => values
+                Def::Enum(_, values) => values
                     .iter()
                     .any(|(known, value)| name.rsplit(['#', '.']).next() == Some(known) && i128::from(*value) == *a),
                 _ => false,
@@ -120,32 +143,6 @@ fn same(source: &Source, ty: Ty, wanted: &Value, got: &VariableValue) -> bool {
         },
         _ => false,
     }
-}
-
-fn compile(text: &str) -> Result<Container, Found> {
-    let input = SourceInput { name: "main.st".to_string(), bytes: text.as_bytes().to_vec() };
-    let compilation = khz_frontend::compile(&[input], &CompileOptions::default());
-    if khz_frontend::diagnostics::has_errors(&compilation.diagnostics) {
-        let errors: Vec<_> = compilation
-            .diagnostics
-            .iter()
-            .filter(|one| one.severity == khz_frontend::diagnostics::Severity::Error)
-            .collect();
-        let code = errors.first().map_or(String::new(), |error| error.code().to_string());
-        let shown = khz_frontend::diagnostics::render::render_all(
-            &compilation
-                .diagnostics
-                .iter()
-                .filter(|one| one.severity == khz_frontend::diagnostics::Severity::Error)
-                .cloned()
-                .collect::<Vec<_>>(),
-            &compilation.sources,
-            Default::default(),
-        );
-        return Err(found(format!("refused {code}"), shown));
-    }
-    let resource = compilation.resources.into_iter().next();
-    resource.map(|resource| resource.container).ok_or_else(|| found("no resource", ""))
 }
 
 fn set_time(image: &mut Image, container: &Container, now: i64) {
@@ -160,109 +157,316 @@ fn set_time(image: &mut Image, container: &Container, now: i64) {
 }
 
 /// Compares one program; `seed` gives the times of its rounds.
-pub fn check(source: &Source, seed: u64, tally: &mut Tally) -> Result<(), Found> {
-    check_text(&print(source), source, seed, tally)
+pub fn check(source: &Source, seed: u64, plan: Plan, tally: &mut Tally) -> Result<(), Found> {
+    let (text, positions) = print_positions(source);
+    check_text(&text, Some(&positions), source, seed, plan, tally)
 }
 
-/// Whether a scan ended as the tree says.
-fn same_ending(place: &str, expected: &Result<(), Stop>, result: &Result<(), Trap>) -> Result<(), Found> {
-    match (expected, result) {
-        (Ok(()), Ok(())) => Ok(()),
-        (Err(Stop::Trap(code, values)), Err(trap)) if *code == trap.code => {
-            // What a step of zero shows besides is not written down.
-            let shown = matches!(code, TrapCode::ArrayIndex) || (*code == TrapCode::Range && *values != [0; 3]);
-            if shown && *values != trap.values {
-                return Err(found("trap values", format!("{place}: {:?} instead of {values:?}", trap.values)));
-            }
-            Ok(())
-        }
-        _ => Err(found("result", format!("{place}: {result:?} instead of {expected:?}"))),
-    }
-}
-
-/// Compares a text with a tree.
-pub fn check_text(text: &str, source: &Source, seed: u64, tally: &mut Tally) -> Result<(), Found> {
-    let container = match compile(text) {
-        Err(found) if REFUSED.contains(&found.class.as_str()) => {
+/// Compares a text with a tree, and where things stand in the text if that is known.
+pub fn check_text(
+    text: &str,
+    positions: Option<&Positions>,
+    source: &Source,
+    seed: u64,
+    plan: Plan,
+    tally: &mut Tally,
+) -> Result<(), Found> {
+    let container = match super::engines::compile(text) {
+        Ok(container) => container,
+        Err(refusal) if REFUSED.contains(&format!("refused {}", refusal.code).as_str()) => {
             tally.refused += 1;
             return Ok(());
         }
-        other => other?,
+        Err(refusal) => return Err(found(format!("refused {}", refusal.code), refusal.text)),
     };
     let verified = verify(container).map_err(|error| found("verifier", error.to_string()))?;
     let verified = Arc::new(verified);
     let layout = ImageLayout::new(verified.container(), IMAGE_LIMIT_BYTES)
         .map_err(|error| found("layout", error.to_string()))?;
-    let mut machines = Vec::new();
-    for maker in super::engines::makers() {
-        let engine = (maker.make)(verified.clone(), &layout, false).map_err(|error| found("engine", error))?;
-        machines.push(Machine { name: maker.name, engine, image: Image::new(layout.clone(), verified.container()) });
-    }
-    let names = VariableTable::of(verified.container());
-    let mut evaluator = Evaluator::new(source, STEPS);
-    let mut places: Option<Vec<Option<Variable>>> = None;
-    let mut random = Random::new(seed ^ 0x7469_6D65);
-    let mut now = 0;
     tally.programs += 1;
-    tally.words(text);
-    for scan in 0..SCANS {
-        let expected = evaluator.scan(now);
-        if expected == Err(Stop::TooLong) {
-            tally.too_long += 1;
-            return Ok(());
-        }
-        tally.scans += 1;
-        let wanted = evaluator.variables();
-        let places = places.get_or_insert_with(|| wanted.iter().map(|(path, ..)| names.resolve(path).ok()).collect());
-        for machine in &mut machines {
-            set_time(&mut machine.image, verified.container(), now);
-            let deadline = DeadlineCell::new();
-            let limits = Limits { deadline: &deadline, fuel: None, task_index: 0 };
-            let result = machine.engine.run(Entry::Instance(0), &mut machine.image, limits);
-            let place = format!("{} scan {scan}", machine.name);
-            same_ending(&place, &expected, &result)?;
-            for ((path, ty, value), variable) in wanted.iter().zip(places.iter()) {
-                let Some(variable) = variable else {
-                    if path.starts_with("main.") {
-                        return Err(found("name", format!("{place}: {path} is not in the dump")));
-                    }
-                    tally.unused += 1;
-                    continue;
-                };
-                let got =
-                    names.read(&machine.image, variable).map_err(|error| found("read", format!("{path}: {error}")))?;
-                tally.values += 1;
-                if !same(source, *ty, value, &got) {
-                    let class = if expected.is_err() { "value after a trap" } else { "value" };
-                    return Err(found(class, format!("{place}: {path} = {got:?} instead of {value:?} ({expected:?})")));
-                }
-            }
-        }
-        if let [first, second] = machines.as_slice()
-            && let Some(at) = first.image.first_difference(&second.image)
-        {
-            return Err(found("engines", format!("scan {scan}: the images differ at {at}")));
-        }
-        if let Err(Stop::Trap(code, _)) = expected {
-            *tally.traps.entry(code.to_string()).or_default() += 1;
-            return Ok(());
-        }
-        now += random.one_of([0, 1, 10_000_000, 7_500_000, 20_000_001]);
+    tally.coverage.count(source, Size::of(seed));
+    if plan.passes != 0 && seed.is_multiple_of(plan.passes) {
+        note_passes(&verified, &layout, tally)?;
+    }
+    let judge = Judge { source, verified: &verified, positions, names: VariableTable::of(verified.container()) };
+    let random = Random::new(seed ^ 0x7469_6D65);
+    if source.config.is_some() {
+        judge.rounds(&layout, plan, tally)
+    } else {
+        judge.scans(&layout, seed, plan, random, tally)
+    }
+}
+
+fn note_passes(verified: &Arc<Verified>, layout: &ImageLayout, tally: &mut Tally) -> Result<(), Found> {
+    let options = JitOptions { note_passes: true, ..JitOptions::default() };
+    let jit = Jit::new(verified.clone(), layout, options).map_err(|error| found("engine", error.to_string()))?;
+    if let Some(fired) = jit.passes_fired() {
+        tally.noted += 1;
+        fired.rows().for_each(|(name, fired)| *tally.passes.entry(name).or_default() += u64::from(fired));
     }
     Ok(())
 }
 
-/// The program of a seed, and if it differs the smallest that differs alike, with its text.
-pub fn check_seed(seed: u64, tally: &mut Tally, tries: usize) -> Option<String> {
-    let source = generate(seed);
-    let Err(first) = check(&source, seed, tally) else { return None };
-    let shows = |source: &Source| matches!(check(source, seed, &mut Tally::default()), Err(other) if other.class == first.class);
-    let small = shrink(&source, &shows, tries);
-    let last = check(&small, seed, &mut Tally::default()).err().map_or(first.text.clone(), |found| found.text);
-    Some(format!("seed {seed}: {}\nfirst: {}\nsmall: {last}\n{}", first.class, first.text, print(&small)))
+/// What the two sides of a comparison share.
+struct Judge<'a> {
+    source: &'a Source,
+    verified: &'a Arc<Verified>,
+    positions: Option<&'a Positions>,
+    names: VariableTable,
 }
 
-/// Whether a type is one that the tally names.
-pub fn names() -> impl Iterator<Item = &'static str> {
-    Kind::ALL.into_iter().map(Kind::name)
+/// Paths and types of the values that are compared, with where an image has them.
+type Places = Vec<(String, Ty, Option<Variable>)>;
+
+impl Judge<'_> {
+    fn places(&self, evaluator: &Evaluator<'_>) -> Places {
+        let wanted = evaluator.variables().into_iter();
+        wanted.map(|(path, ty, _)| (path.clone(), ty, self.names.resolve(&path).ok())).collect()
+    }
+
+    fn line(&self, place: CodePlace) -> Option<(u32, u32)> {
+        describe(place, self.verified.container()).source.map(|source| (source.line, source.column))
+    }
+
+    /// Whether a scan ended as the tree says, and where.
+    fn same_ending(
+        &self,
+        place: &str,
+        evaluator: &Evaluator<'_>,
+        expected: &Result<(), Stop>,
+        result: &Result<(), Trap>,
+    ) -> Result<(), Found> {
+        let (code, values, trap) = match (expected, result) {
+            (Ok(()), Ok(())) => return Ok(()),
+            (Err(Stop::Trap(code, values)), Err(trap)) if *code == trap.code => (code, values, trap),
+            _ => return Err(found("result", format!("{place}: {result:?} instead of {expected:?}"))),
+        };
+        // What a step of zero shows besides is not written down.
+        let shown = matches!(code, TrapCode::ArrayIndex) || (*code == TrapCode::Range && *values != [0; 3]);
+        if shown && *values != trap.values {
+            return Err(found("trap values", format!("{place}: {:?} instead of {values:?}", trap.values)));
+        }
+        let Some(positions) = self.positions else { return Ok(()) };
+        let got = std::iter::once(trap.place).chain(trap.chain().iter().copied()).map(|place| self.line(place));
+        for (number, (key, got)) in evaluator.trapped_at().iter().zip(got).enumerate() {
+            let wanted = positions.of(*key);
+            if wanted != got {
+                let what = if number == 0 { "trap place" } else { "trap chain" };
+                let text = format!("{place}: {code} at {got:?} instead of {wanted:?} (caller {number})");
+                return Err(found(what, text));
+            }
+        }
+        if trap.chain().len() + 1 < evaluator.trapped_at().len() {
+            return Err(found("trap chain", format!("{place}: {} calls are shown", trap.chain().len())));
+        }
+        Ok(())
+    }
+
+    /// Whether an image holds what the tree says.
+    fn same_values(
+        &self,
+        place: &str,
+        evaluator: &Evaluator<'_>,
+        places: &Places,
+        image: &Image,
+        tally: &mut Tally,
+    ) -> Result<(), Found> {
+        let mut wanted = Vec::with_capacity(places.len());
+        evaluator.values(&mut wanted);
+        for ((path, ty, variable), value) in places.iter().zip(wanted) {
+            let Some(variable) = variable else {
+                if path.starts_with("main.") {
+                    return Err(found("name", format!("{place}: {path} is not in the dump")));
+                }
+                tally.unused += 1;
+                continue;
+            };
+            let got = self.names.read(image, variable).map_err(|error| found("read", format!("{path}: {error}")))?;
+            tally.values += 1;
+            if !same(self.source, *ty, value, &got) {
+                return Err(found("value", format!("{place}: {path} = {got:?} instead of {value:?}")));
+            }
+        }
+        let (outputs, markers) = evaluator.image_bytes();
+        for (area, range, wanted) in [("%Q", &image.layout().output, outputs), ("%M", &image.layout().memory, markers)]
+        {
+            let got = &image.bytes()[range.start as usize..range.end as usize];
+            let count = got.len().min(wanted.len());
+            if got[..count] != wanted[..count] {
+                return Err(found("image", format!("{place}: {area} {got:X?} instead of {wanted:X?}")));
+            }
+        }
+        Ok(())
+    }
+
+    fn machines(&self, layout: &ImageLayout, with_fuel: bool) -> Result<Vec<Machine>, Found> {
+        let mut machines = Vec::new();
+        for fuel in [false, true].into_iter().filter(|fuel| with_fuel || !fuel) {
+            for maker in super::engines::makers() {
+                let made = (maker.make)(self.verified.clone(), layout, fuel);
+                let engine = made.map_err(|error| found("engine", error))?;
+                let name = format!("{}{}", maker.name, if fuel { " with fuel" } else { "" });
+                machines.push(Machine {
+                    name,
+                    engine,
+                    image: Image::new(layout.clone(), self.verified.container()),
+                    fuel,
+                });
+            }
+        }
+        Ok(machines)
+    }
+
+    /// Every program instance in every scan, at times of the seed.
+    fn scans(
+        &self,
+        layout: &ImageLayout,
+        seed: u64,
+        plan: Plan,
+        mut random: Random,
+        tally: &mut Tally,
+    ) -> Result<(), Found> {
+        let with_fuel = plan.fuel != 0 && seed % plan.fuel == 1 % plan.fuel;
+        tally.with_fuel += u64::from(with_fuel);
+        let mut machines = self.machines(layout, with_fuel)?;
+        for machine in &mut machines {
+            run(machine, Entry::Init).map_err(|trap| found("init", format!("{trap:?}")))?;
+        }
+        let mut evaluator = Evaluator::new(self.source, STEPS);
+        let places = self.places(&evaluator);
+        let mut now = 0;
+        for scan in 0..plan.scans {
+            evaluator.input_bytes().iter_mut().for_each(|byte| *byte = random.bits() as u8);
+            let inputs = evaluator.input_bytes().to_vec();
+            let expected = evaluator.scan(now);
+            if expected == Err(Stop::TooLong) {
+                tally.too_long += 1;
+                return Ok(());
+            }
+            tally.scans += 1;
+            for machine in &mut machines {
+                set_time(&mut machine.image, self.verified.container(), now);
+                set_inputs(&mut machine.image, &inputs);
+                let result = run(machine, Entry::Instance(0));
+                let place = format!("{} scan {scan}", machine.name);
+                self.same_ending(&place, &evaluator, &expected, &result)?;
+                self.same_values(&place, &evaluator, &places, &machine.image, tally)
+                    .map_err(|found| after(found, &expected))?;
+            }
+            let (first, others) = machines.split_first().ok_or_else(|| found("engine", "none"))?;
+            for other in others {
+                if let Some(at) = first.image.first_difference(&other.image) {
+                    let text = format!("scan {scan}: {} and {} differ at {at}", first.name, other.name);
+                    return Err(found("engines", text));
+                }
+            }
+            if let Err(Stop::Trap(code, _)) = expected {
+                *tally.traps.entry(code.to_string()).or_default() += 1;
+                return Ok(());
+            }
+            now += random.one_of([0, 1, 10_000_000, 7_500_000, 20_000_001]);
+        }
+        Ok(())
+    }
+
+    /// The rounds of a CONFIGURATION in the scheduler, on the virtual clock.
+    fn rounds(&self, layout: &ImageLayout, plan: Plan, tally: &mut Tally) -> Result<(), Found> {
+        let mut evaluator = Evaluator::new(self.source, STEPS);
+        let started = evaluator.start();
+        let mut running: Vec<(String, Resource<Running>)> = Vec::new();
+        for machine in self.machines(layout, false)? {
+            let options = LoadOptions { max_image_bytes: IMAGE_LIMIT_BYTES, ..LoadOptions::default() };
+            let clock = Box::new(VirtualClock::new());
+            let loaded = Resource::load(self.verified.clone(), machine.engine, clock, &options);
+            let stopped = loaded.map_err(|error| found("load", error.to_string()))?;
+            let result = match stopped.start() {
+                Ok(resource) => {
+                    running.push((machine.name.clone(), resource));
+                    Ok(())
+                }
+                Err(faulted) => Err(faulted.report().trap),
+            };
+            self.same_ending(&format!("{} start", machine.name), &evaluator, &started, &result)?;
+        }
+        if started.is_err() {
+            return Ok(());
+        }
+        let places = self.places(&evaluator);
+        let mut rounds = Rounds::new(self.source);
+        for round in 0..plan.scans {
+            let expected = rounds.run(&mut evaluator);
+            if expected == Err(Stop::TooLong) {
+                tally.too_long += 1;
+                return Ok(());
+            }
+            tally.scans += 1;
+            let mut next = Vec::new();
+            for (name, resource) in running {
+                let place = format!("{name} round {round} at {} ns", rounds.now_ns());
+                let hooks = &mut Hooks { io: &mut NoIo, inputs: &mut NoInputs, observer: &mut NoObserver };
+                match resource.run_round(hooks) {
+                    Ok((mut resource, ran)) => {
+                        self.same_ending(&place, &evaluator, &expected, &Ok(()))?;
+                        if ran.time.0 != rounds.now_ns() {
+                            return Err(found("time", format!("{place}: the round was at {}", ran.time.0)));
+                        }
+                        self.same_values(&place, &evaluator, &places, resource.image(), tally)?;
+                        let wake = resource.next_wake(hooks);
+                        resource.wait(wake);
+                        next.push((name, resource));
+                    }
+                    Err(faulted) => {
+                        self.same_ending(&place, &evaluator, &expected, &Err(faulted.report().trap))?;
+                        self.same_values(&place, &evaluator, &places, faulted.image(), tally)
+                            .map_err(|found| after(found, &expected))?;
+                    }
+                }
+            }
+            if let Err(Stop::Trap(code, _)) = expected {
+                *tally.traps.entry(code.to_string()).or_default() += 1;
+                return Ok(());
+            }
+            running = next;
+            if !rounds.wait(&evaluator) {
+                return Ok(());
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A difference behind a trap is one of its own.
+fn after(mut found: Found, expected: &Result<(), Stop>) -> Found {
+    if expected.is_err() {
+        found.class += " after a trap";
+    }
+    found
+}
+
+fn run(machine: &mut Machine, entry: Entry) -> Result<(), Trap> {
+    let deadline = DeadlineCell::new();
+    let mut fuel = Fuel { left: FUEL };
+    let limits = Limits { deadline: &deadline, fuel: machine.fuel.then_some(&mut fuel), task_index: 0 };
+    machine.engine.run(entry, &mut machine.image, limits)
+}
+
+fn set_inputs(image: &mut Image, inputs: &[u8]) {
+    let range = image.layout().input.clone();
+    let bytes = &mut image.bytes_mut()[range.start as usize..range.end as usize];
+    let count = bytes.len().min(inputs.len());
+    bytes[..count].copy_from_slice(&inputs[..count]);
+}
+
+/// The program of a seed, and if it differs the smallest that differs alike, with its text.
+pub fn check_seed(seed: u64, plan: Plan, tally: &mut Tally, tries: usize) -> Option<String> {
+    let source = generate(seed);
+    let Err(first) = check(&source, seed, plan, tally) else { return None };
+    if tries == 0 {
+        return Some(format!("seed {seed}: {}\n{}", first.class, first.text));
+    }
+    let again = |source: &Source| check(source, seed, plan, &mut Tally::default());
+    let shows = |source: &Source| matches!(again(source), Err(other) if other.class == first.class);
+    let small = shrink(&source, &shows, tries);
+    let last = again(&small).err().map_or(first.text.clone(), |found| found.text);
+    Some(format!("seed {seed}: {}\nfirst: {}\nsmall: {last}\n{}", first.class, first.text, print(&small)))
 }

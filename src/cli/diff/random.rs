@@ -120,7 +120,7 @@ fn check(args: &DiffArgs, programs: Programs, seed: u64, reached: &mut Reached) 
         return Some(format!("Structured Text, {} and {}: {}", found.left, found.right, found.description));
     }
     reached.with_inputs += 1;
-    if let Some(found) = oracle::check_seed(seed, &mut reached.text, 0) {
+    if let Some(found) = oracle::check_seed(seed, oracle::Plan::default(), &mut reached.text, 0) {
         return Some(format!("Structured Text against its meaning: {}", first_lines(&found, 2)));
     }
     if !programs.has_container(seed) {
@@ -144,7 +144,7 @@ fn smallest(args: &DiffArgs, programs: Programs, seed: u64) -> Option<String> {
     if let Some(small) = small {
         return Some(small.to_string());
     }
-    if let Some(found) = oracle::check_seed(seed, &mut oracle::Tally::default(), TRIES) {
+    if let Some(found) = oracle::check_seed(seed, oracle::Plan::default(), &mut oracle::Tally::default(), TRIES) {
         return Some(found);
     }
     if !programs.has_container(seed) {

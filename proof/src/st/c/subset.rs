@@ -12,6 +12,7 @@ use crate::random::Random;
 #[must_use]
 pub fn subset(source: &Source, seed: u64) -> Source {
     let mut small = source.clone();
+    small.config = None;
     let last = small.units.len().saturating_sub(1);
     for unit in &mut small.units[..last] {
         unit.gone |= unit.kind == UnitKind::Program;
@@ -107,7 +108,7 @@ impl Subset<'_> {
             Step::Index(indices) => indices.iter().all(|index| self.expr(index)),
             other => matches!(other, Step::Field(_)),
         };
-        is_own && is_type(self.source, var.ty) && place.steps.iter().all(is_step)
+        is_own && var.at.is_none() && is_type(self.source, var.ty) && place.steps.iter().all(is_step)
     }
 
     fn expr(&self, expr: &Expr) -> bool {

@@ -1,0 +1,268 @@
+//! Calls of standard functions, conversions, and strings.
+
+use khz_machine::library::functions::{FunctionRow, ResultRule, TABLE, TypeClass};
+
+use super::expression::{boxed, lit};
+use super::functions::{Function, compares, row};
+use super::generate::Generator;
+use super::tree::{Class, Expr, ExprKind, Kind, Op, Ty, UnitKind, Value};
+
+/// Whether a parameter of a class takes a type.
+fn takes(class: TypeClass, kind: Kind) -> bool {
+    match class {
+        TypeClass::AnyElementary => true,
+        TypeClass::AnyMagnitude => kind != Kind::Bool,
+        TypeClass::AnyNum => kind.is_integer() || kind.is_bits() || kind.is_real(),
+        TypeClass::AnyReal => kind.is_real(),
+        TypeClass::AnyInt | TypeClass::Shiftable | TypeClass::Count => kind.is_integer() || kind.is_bits(),
+        TypeClass::AnyBit => kind == Kind::Bool || kind.is_integer() || kind.is_bits(),
+        TypeClass::Bool => kind == Kind::Bool,
+        TypeClass::AnyString => false,
+    }
+}
+
+/// Whether a function can give a type.
+fn gives(row: &FunctionRow, kind: Kind) -> bool {
+    let generic = || row.parameters.iter().filter(|parameter| parameter.class.is_generic());
+    match row.result {
+        ResultRule::Bool => kind == Kind::Bool,
+        ResultRule::Int => kind == Kind::Int,
+        ResultRule::Generic => {
+            generic().all(|parameter| takes(parameter.class, kind) || row.function == Function::Expt) && {
+                // The remainder of a duration is not defined; EXPT gives what its base is.
+                row.function != Function::Expt || kind.is_real()
+            }
+        }
+        // What it gives hangs on the place: see `conversion`.
+        ResultRule::WantedInteger | ResultRule::String => false,
+    }
+}
+
+fn std(kind: Kind, function: Function, inputs: Vec<Expr>) -> Expr {
+    Expr { ty: Ty::K(kind), kind: ExprKind::Std(function, inputs) }
+}
+
+impl Generator {
+    /// A standard function or a conversion of a result type.
+    pub(super) fn function(&mut self, kind: Kind, depth: usize) -> Expr {
+        if self.r.chance(30) {
+            return self.conversion(kind, depth);
+        }
+        let rows: Vec<&FunctionRow> = TABLE.iter().filter(|row| gives(row, kind)).collect();
+        let Some(row) = self.r.pick(&rows).copied() else { return self.leaf(kind) };
+        let function = row.function;
+        match function {
+            _ if compares(function) => self.comparison(row, depth),
+            Function::Len => std(kind, function, vec![self.string(depth)]),
+            Function::Find => {
+                let wanted = self.r.one_of([&b"a"[..], b"1", b"ab", b"A0", b"", b".", b"1.0"]).to_vec();
+                let text = self.string(depth);
+                let wanted = if self.r.chance(80) {
+                    Expr { ty: Ty::S(3), kind: ExprKind::Lit(Value::Str(wanted), false) }
+                } else {
+                    self.string(0)
+                };
+                std(kind, function, vec![text, wanted])
+            }
+            Function::Div | Function::Mod if !kind.is_real() && !kind.is_duration() => {
+                let left = self.expr(kind, depth);
+                let right = self.divisor(kind, depth);
+                std(kind, function, vec![left, right])
+            }
+            Function::Mul | Function::Div if kind.is_duration() => {
+                let time = self.expr(kind, depth);
+                let (op, number) = self.factor(depth);
+                std(kind, if op == Op::Mul { Function::Mul } else { Function::Div }, vec![time, number])
+            }
+            Function::Expt => {
+                let base = self.expr(kind, depth);
+                let exponent = self.exponent(kind, depth);
+                std(kind, function, vec![base, exponent])
+            }
+            _ => self.generic(row, kind, depth),
+        }
+    }
+
+    /// What is not nothing, so that no division traps, or anything.
+    fn divisor(&mut self, kind: Kind, depth: usize) -> Expr {
+        if !self.is_pure && self.r.chance(20) {
+            return self.expr(kind, depth);
+        }
+        let value = match self.number(kind) {
+            Value::Int(0) => Value::Int(3),
+            other => other,
+        };
+        lit(kind, value, true)
+    }
+
+    /// A power's exponent: of any type of number that is brought to the type of the base.
+    pub(super) fn exponent(&mut self, kind: Kind, depth: usize) -> Expr {
+        let from = match self.r.below(4) {
+            0 if kind == Kind::Lreal => Kind::Real,
+            1 | 2 => self.r.one_of(Kind::INTEGERS),
+            _ => return self.expr(kind, depth),
+        };
+        let inner = self.expr(from, depth);
+        Expr { ty: Ty::K(kind), kind: ExprKind::Widen(boxed(inner)) }
+    }
+
+    /// A function by the classes of its parameters: the generic ones have the type of the result.
+    fn generic(&mut self, row: &FunctionRow, kind: Kind, depth: usize) -> Expr {
+        let more = if row.extensible { self.r.weighted(&[5, 3, 1]) } else { 0 };
+        let last = row.parameters.len() - 1;
+        let mut inputs: Vec<Expr> = Vec::new();
+        let mut first: Option<usize> = None;
+        for at in 0..row.parameters.len() + more {
+            let input = match row.parameters[at.min(last)].class {
+                TypeClass::Bool => self.expr(Kind::Bool, depth),
+                TypeClass::Count => self.count(i64::from(kind.bits()), depth),
+                TypeClass::AnyString => self.string(depth),
+                // An integer where only floats are taken becomes an LREAL.
+                TypeClass::AnyReal if kind == Kind::Lreal && row.parameters.len() == 1 && self.r.chance(15) => {
+                    let from = self.r.one_of(Kind::INTEGERS);
+                    let inner = self.expr(from, depth);
+                    Expr { ty: Ty::K(kind), kind: ExprKind::Widen(boxed(inner)) }
+                }
+                _ => {
+                    let known: Option<Expr> = first.map(|at| inputs[at].clone());
+                    first = first.or(Some(at));
+                    match known {
+                        Some(known) => self.other(row.parameters[at.min(last)].class, kind, &known, depth),
+                        None => self.expr(kind, depth),
+                    }
+                }
+            };
+            inputs.push(input);
+        }
+        std(kind, row.function, inputs)
+    }
+
+    /// A further generic input, of a type that the class takes too.
+    fn other(&mut self, class: TypeClass, kind: Kind, known: &Expr, depth: usize) -> Expr {
+        let found = self.right(kind, known, depth);
+        match &found.kind {
+            ExprKind::Widen(inner) if !matches!(inner.ty, Ty::K(from) if takes(class, from)) => self.expr(kind, depth),
+            _ => found,
+        }
+    }
+
+    /// A count of bits or characters, a position or a selector; mostly a small one.
+    fn count(&mut self, most: i64, depth: usize) -> Expr {
+        if self.r.chance(65) {
+            let count = self.r.between(-1, most + 2);
+            return lit(Kind::Int, Value::Int(i128::from(count)), false);
+        }
+        let kind = if self.r.chance(50) { Kind::Usint } else { self.r.one_of(Kind::INTEGERS) };
+        self.expr(kind, depth)
+    }
+
+    /// Two or more values compared as functions do.
+    fn comparison(&mut self, row: &FunctionRow, depth: usize) -> Expr {
+        let more = if row.extensible { self.r.weighted(&[5, 2, 1]) } else { 0 };
+        let mut inputs = Vec::new();
+        if self.r.chance(15) {
+            for _ in 0..2 + more {
+                inputs.push(self.string(depth.min(1)));
+            }
+        } else {
+            let kind = self.kind();
+            for _ in 0..2 + more {
+                inputs.push(self.expr(kind, depth));
+            }
+        }
+        std(Kind::Bool, row.function, inputs)
+    }
+
+    /// A string that no integer type overflows at.
+    fn place_of_short_string(&mut self) -> Option<Expr> {
+        let ty = Ty::S(self.r.one_of([2, 5, 8]));
+        let place = self.place(ty, false)?;
+        Some(Expr { ty, kind: ExprKind::Get(place) })
+    }
+
+    pub(super) fn conversion(&mut self, kind: Kind, depth: usize) -> Expr {
+        let wrap = |inner: Expr| Expr { ty: Ty::K(kind), kind: ExprKind::Conv(boxed(inner)) };
+        if self.r.chance(15) {
+            let is_whole = kind.is_integer() || kind.is_bits();
+            let text = if is_whole { self.place_of_short_string() } else { Some(self.string(depth)) };
+            return text.map_or_else(|| self.leaf(kind), wrap);
+        }
+        if self.r.chance(8) {
+            let enums: Vec<Ty> = self.shapes.iter().map(|shape| shape.ty).filter(|ty| self.is_enum(*ty)).collect();
+            if let Some(ty) = self.r.pick(&enums).copied()
+                && let Some(value) = self.value(ty, 1)
+            {
+                return wrap(value);
+            }
+        }
+        if kind != Kind::Dint && self.r.chance(8) {
+            // TRUNC gives a DINT where a DINT is wanted.
+            let from = self.r.one_of([Kind::Real, Kind::Lreal]);
+            let inner = self.expr(from, depth);
+            return wrap(std(Kind::Dint, Function::Trunc, vec![inner]));
+        }
+        let from = self.kind();
+        let results = self.source.units.iter().filter(|unit| unit.kind == UnitKind::Function);
+        let result =
+            |class: Class, ty: Ty| if let (Class::Return, Ty::K(kind)) = (class, ty) { Some(kind) } else { None };
+        let results: Vec<Kind> =
+            results.filter_map(|unit| unit.vars.first().and_then(|var| result(var.class, var.ty))).collect();
+        let wanted = self.r.pick(&results).copied();
+        if let Some(result) = wanted.filter(|from| *from != kind && self.r.chance(50))
+            && let Some(call) = self.call(Ty::K(result), depth)
+        {
+            return wrap(call);
+        }
+        if from == kind {
+            return self.leaf(kind);
+        }
+        let inner = self.expr(from, depth);
+        let cut = from.is_real() && kind.is_integer() && self.r.chance(40);
+        if cut { Expr { ty: Ty::K(kind), kind: ExprKind::Trunc(boxed(inner)) } } else { wrap(inner) }
+    }
+
+    /// An expression of a string type.
+    pub(super) fn string(&mut self, depth: usize) -> Expr {
+        let capacity = self.r.one_of([1, 2, 5, 8, 12, 20]);
+        if depth == 0 || self.r.chance(40) {
+            let read = if self.r.chance(75) { self.place(Ty::S(capacity), false) } else { None };
+            return match read {
+                Some(place) => Expr { ty: Ty::S(capacity), kind: ExprKind::Get(place) },
+                None => {
+                    let text = self.text(12);
+                    Expr { ty: Ty::S(12), kind: ExprKind::Lit(Value::Str(text), false) }
+                }
+            };
+        }
+        let d = depth - 1;
+        if self.r.chance(15)
+            && let Some(call) = self.call(Ty::S(capacity), d)
+        {
+            return call;
+        }
+        if self.r.chance(20) {
+            let kind = self.kind();
+            let inner = self.expr(kind, d);
+            return Expr { ty: Ty::S(80), kind: ExprKind::Conv(boxed(inner)) };
+        }
+        let takes_text = |row: &&FunctionRow| {
+            let chooses = row.result == ResultRule::Generic
+                && row.parameters.iter().any(|parameter| parameter.class == TypeClass::AnyElementary);
+            row.result == ResultRule::String || chooses
+        };
+        let rows: Vec<&FunctionRow> = TABLE.iter().filter(takes_text).collect();
+        let Some(found) = self.r.pick(&rows).copied() else { return self.string(0) };
+        let more = if found.extensible && self.r.chance(25) { 1 } else { 0 };
+        let mut inputs = Vec::new();
+        let last = found.parameters.len() - 1;
+        for at in 0..found.parameters.len() + more {
+            inputs.push(match found.parameters[at.min(last)].class {
+                TypeClass::Bool => self.expr(Kind::Bool, d),
+                TypeClass::Count => self.count(9, d),
+                _ => self.string(if at == 0 { d.min(1) } else { 0 }),
+            });
+        }
+        debug_assert_eq!(row(found.function).name, found.name);
+        Expr { ty: Ty::S(80), kind: ExprKind::Std(found.function, inputs) }
+    }
+}

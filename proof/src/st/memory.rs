@@ -1,0 +1,108 @@
+//! Where values live while a tree is run: frames of composed values, and the bytes of the process image.
+
+use super::tree::{Area, At, Kind, Value};
+
+/// Bytes of each area that the generator uses.
+pub const IMAGE_BYTES: usize = 24;
+
+/// A variable or a part of one.
+#[derive(Debug, Clone)]
+pub(super) struct Ref {
+    /// A frame, unless it lies in the process image.
+    pub frame: usize,
+    /// The way through composed values.
+    pub path: Vec<usize>,
+    /// Its address and type, if it lies in the process image.
+    pub image: Option<(At, Kind)>,
+    /// Of its bits only some: the first, how many, and the type of all.
+    pub part: Option<(u32, u32, Kind)>,
+}
+
+impl Ref {
+    pub(super) fn frame(frame: usize) -> Ref {
+        Ref { frame, path: Vec::new(), image: None, part: None }
+    }
+
+    pub(super) fn image(at: At, kind: Kind) -> Ref {
+        Ref { image: Some((at, kind)), ..Ref::frame(0) }
+    }
+
+    pub(super) fn child(&self, part: usize) -> Ref {
+        let mut found = self.clone();
+        found.path.push(part);
+        found
+    }
+}
+
+/// All that a running program can store to.
+#[derive(Debug, Clone)]
+pub(super) struct Memory {
+    pub frames: Vec<Value>,
+    /// %I, %Q, %M.
+    pub image: [Vec<u8>; 3],
+}
+
+fn area(at: At) -> usize {
+    match at.area {
+        Area::Input => 0,
+        Area::Output => 1,
+        Area::Memory => 2,
+    }
+}
+
+impl Memory {
+    pub(super) fn new(frames: Vec<Value>) -> Memory {
+        Memory { frames, image: [vec![0; IMAGE_BYTES], vec![0; IMAGE_BYTES], vec![0; IMAGE_BYTES]] }
+    }
+
+    /// The value of what lies in no process image and is no part of bits.
+    pub(super) fn at(&mut self, place: &Ref) -> &mut Value {
+        place.path.iter().fold(&mut self.frames[place.frame], |value, step| match value {
+            Value::Many(parts) => &mut parts[*step],
+            other => panic!("{other:?} has no parts"),
+        })
+    }
+
+    fn whole(&mut self, place: &Ref) -> Value {
+        let Some((at, kind)) = place.image else { return self.at(place).clone() };
+        let bytes = &self.image[area(at)];
+        if kind == Kind::Bool {
+            return Value::Int(i128::from(bytes[at.byte] >> at.bit & 1));
+        }
+        let width = kind.bits() as usize / 8;
+        let pattern = bytes[at.byte..at.byte + width].iter().rev().fold(0, |sum, byte| sum << 8 | i128::from(*byte));
+        Value::Int(kind.wrap(pattern))
+    }
+
+    pub(super) fn read(&mut self, place: &Ref) -> Value {
+        let value = self.whole(place);
+        match place.part {
+            Some((first, count, _)) => Value::Int(value.int() >> first & ((1 << count) - 1)),
+            None => value,
+        }
+    }
+
+    pub(super) fn write(&mut self, place: &Ref, value: Value) {
+        let value = match place.part {
+            Some((first, count, kind)) => {
+                let mask = ((1_i128 << count) - 1) << first;
+                let old = self.whole(place).int();
+                Value::Int(kind.wrap(old & !mask | value.int() << first & mask))
+            }
+            None => value,
+        };
+        let Some((at, kind)) = place.image else {
+            *self.at(place) = value;
+            return;
+        };
+        let bytes = &mut self.image[area(at)];
+        if kind == Kind::Bool {
+            let bit = 1 << at.bit;
+            bytes[at.byte] = if value.int() == 0 { bytes[at.byte] & !bit } else { bytes[at.byte] | bit };
+            return;
+        }
+        for (shift, byte) in bytes[at.byte..].iter_mut().take(kind.bits() as usize / 8).enumerate() {
+            *byte = (value.int() >> (8 * shift) & 0xFF) as u8;
+        }
+    }
+}
