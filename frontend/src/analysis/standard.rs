@@ -180,7 +180,7 @@ impl<'a> Checker<'_, 'a> {
             (F::Ne, BinOp::Ne),
         ];
         if let Some((_, op)) = compares.iter().find(|(function, _)| *function == row.function) {
-            return self.compare_chain(*op, &values, span);
+            return self.compare_chain(*op, values, span);
         }
         match row.function {
             F::Add
@@ -228,15 +228,28 @@ impl<'a> Checker<'_, 'a> {
         }
     }
 
-    fn compare_chain(&mut self, op: BinOp, values: &[Expr], span: Span) -> Expr {
+    /// `GT(a, b, c)`: a > b AND b > c, where b is evaluated once.
+    fn compare_chain(&mut self, op: BinOp, values: Vec<Expr>, span: Span) -> Expr {
+        let last = values.len().saturating_sub(1);
+        let mut values = values.into_iter().enumerate();
+        let Some((_, mut left)) = values.next() else { return broken(span) };
         let mut found: Option<Expr> = None;
-        for pair in values.windows(2) {
-            let [a, b] = pair else { continue };
-            let one = self.binary_op(op, a.clone(), b.clone(), span, Ty::Void);
+        for (at, value) in values {
+            // Constants and variables are read again; between the two readings nothing is evaluated.
+            let is_read_again = at == last || matches!(value.kind, ExprKind::Const(_) | ExprKind::Load(_));
+            let (right, next) = if is_read_again {
+                (value.clone(), value)
+            } else {
+                let (ty, span) = (value.ty, value.span);
+                let kept = Expr { kind: ExprKind::Kept, ty, span };
+                (Expr { kind: ExprKind::Keep(Box::new(value)), ty, span }, kept)
+            };
+            let one = self.binary_op(op, left, right, span, Ty::Void);
             found = Some(match found {
                 None => one,
                 Some(before) => self.binary_op(BinOp::And, before, one, span, BOOL),
             });
+            left = next;
         }
         found.unwrap_or_else(|| broken(span))
     }

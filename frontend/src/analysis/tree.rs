@@ -430,6 +430,10 @@ pub enum ExprKind {
     Mux(Vec<Expr>),
     /// A call of a function.
     Call(Box<Call>),
+    /// A value that is needed once more: the next [`ExprKind::Kept`] that is evaluated gives it again.
+    Keep(Box<Expr>),
+    /// The value of the last [`ExprKind::Keep`] that was not given again yet.
+    Kept,
     /// A string operation on strings and DINT numbers.
     Text(TextOp, Vec<Expr>),
 }

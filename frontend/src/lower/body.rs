@@ -25,6 +25,14 @@ pub(super) struct CallContext {
     pub(super) outputs: Vec<(VarId, Home)>,
 }
 
+/// Where a value waits that an expression needs once more.
+pub(super) enum Kept {
+    /// A scalar.
+    Slot(SlotIndex),
+    /// Anything else: its place in the frame.
+    Frame(u32),
+}
+
 /// A function in the making.
 pub(super) struct FunctionBuilder<'b, 'p> {
     pub(super) b: &'b mut Builder<'p>,
@@ -43,6 +51,8 @@ pub(super) struct FunctionBuilder<'b, 'p> {
     free_slots: BTreeMap<Storage, Vec<SlotIndex>>,
     free_temporaries: BTreeMap<Ty, Vec<u32>>,
     used_temporaries: Vec<(Ty, u32)>,
+    /// Values of the expression that is made which it needs once more, the next one last.
+    pub(super) kept: Vec<Kept>,
     loops: Vec<(Label, Label)>,
     end: Label,
 }
@@ -66,6 +76,7 @@ impl<'b, 'p> FunctionBuilder<'b, 'p> {
             free_slots: BTreeMap::new(),
             free_temporaries: BTreeMap::new(),
             used_temporaries: Vec::new(),
+            kept: Vec::new(),
             loops: Vec::new(),
             end,
         }

@@ -5,7 +5,7 @@ use khz_bytecode::container::{Constant, ElementaryType as E};
 use khz_bytecode::instruction::{Instruction as I, NumericOp as N};
 use khz_bytecode::value::{IntegerType, SlotPlace, ValueType};
 
-use super::body::FunctionBuilder;
+use super::body::{FunctionBuilder, Kept};
 use super::ops;
 use crate::analysis::NS_PER_MS;
 use crate::analysis::tree::{BinOp, Expr, ExprKind, TextOp, UnOp};
@@ -95,6 +95,19 @@ impl FunctionBuilder<'_, '_> {
             }
             ExprKind::Mux(parts) => self.mux(parts),
             ExprKind::Call(call) => self.call_value(call, expr.ty),
+            ExprKind::Keep(value) => {
+                self.value(value);
+                let slot = self.scratch(ty.storage());
+                self.e.push(I::SlotStore { place: SlotPlace::Local, index: slot }, 1, 0);
+                self.e.push(I::SlotLoad { place: SlotPlace::Local, index: slot }, 0, 1);
+                self.kept.push(Kept::Slot(slot));
+            }
+            ExprKind::Kept => {
+                if let Some(Kept::Slot(slot)) = self.kept.pop() {
+                    self.e.push(I::SlotLoad { place: SlotPlace::Local, index: slot }, 0, 1);
+                    self.release(slot);
+                }
+            }
             ExprKind::Text(op, parts) => self.text_scalar(*op, parts, ty),
         }
     }

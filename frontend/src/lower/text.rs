@@ -3,7 +3,7 @@
 use khz_bytecode::instruction::{HelperOp as H, Instruction as I, MAX_CAPACITIES, NumericOp as N};
 use khz_bytecode::value::{BytePlace, SlotPlace, Storage};
 
-use super::body::FunctionBuilder;
+use super::body::{FunctionBuilder, Kept};
 use crate::analysis::tree::{BinOp, Expr, ExprKind, Place, TextOp};
 use crate::analysis::types::{Const, Ty, is_duration, is_real, is_signed};
 use khz_bytecode::container::ElementaryType as E;
@@ -42,6 +42,18 @@ impl FunctionBuilder<'_, '_> {
                 }
             }
             ExprKind::Binary(op, a, b) => self.extreme(*op, a, b, expr.ty),
+            ExprKind::Keep(value) => {
+                let offset = self.temporary(expr.ty);
+                self.push_address(BytePlace::Frame, offset, expr.ty);
+                self.assign_text_from(value, expr.ty);
+                self.push_address(BytePlace::Frame, offset, expr.ty);
+                self.kept.push(Kept::Frame(offset));
+            }
+            ExprKind::Kept => {
+                if let Some(Kept::Frame(offset)) = self.kept.pop() {
+                    self.push_address(BytePlace::Frame, offset, expr.ty);
+                }
+            }
             _ => {
                 let offset = self.temporary(expr.ty);
                 self.push_address(BytePlace::Frame, offset, expr.ty);
