@@ -23,7 +23,7 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("interp", &["khz-bytecode", "khz-machine"]),
     ("jit", &["khz-bytecode", "khz-machine"]),
     ("scheduler", &["khz-bytecode", "khz-machine"]),
-    ("proof", &["khz-bytecode", "khz-machine"]),
+    ("proof", &["khz-bytecode", "khz-frontend", "khz-interp", "khz-jit", "khz-machine", "khz-scheduler"]),
 ];
 
 fn root() -> PathBuf {

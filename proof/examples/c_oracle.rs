@@ -3,8 +3,6 @@
 
 #[path = "../tests/common/c.rs"]
 mod c;
-#[path = "../tests/common/mod.rs"]
-mod engines;
 
 /// Programs in one C file: the compiler holds all of them at once.
 const AT_ONCE: u64 = 500;

@@ -3,15 +3,13 @@
 #![allow(clippy::print_stdout, reason = "a program for people")]
 
 mod common;
-#[path = "../tests/common/mod.rs"]
-mod engines;
 
 use std::process::ExitCode;
 use std::sync::Arc;
 
-use engines::Engines;
 use khz_proof::bytecode::{Size, generate, generate_sized};
 use khz_proof::campaign::Report;
+use khz_proof::harness::engines::Engines;
 use khz_proof::oracle::{Plan, compare, reduce};
 use khz_proof::statistics::Statistics;
 

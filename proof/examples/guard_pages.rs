@@ -3,8 +3,6 @@
 #![allow(clippy::print_stdout, reason = "a program for people")]
 
 mod common;
-#[path = "../tests/common/mod.rs"]
-mod engines;
 #[path = "../tests/common/guarded.rs"]
 mod guarded;
 #[path = "../tests/common/guarded_search.rs"]

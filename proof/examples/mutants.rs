@@ -8,8 +8,6 @@
 #[path = "../tests/common/bases.rs"]
 mod bases;
 mod common;
-#[path = "../tests/common/mod.rs"]
-mod engines;
 #[path = "../tests/common/measure.rs"]
 mod measure;
 
@@ -18,6 +16,7 @@ use std::sync::Arc;
 
 use common::Arguments;
 use khz_proof::campaign::Figures;
+use khz_proof::harness::engines;
 use khz_proof::mutate::{Tally, accepted};
 use khz_proof::oracle::{Plan, compare, reduce};
 use khz_proof::statistics::Statistics;

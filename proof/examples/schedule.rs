@@ -4,13 +4,9 @@
 
 #[path = "common/mod.rs"]
 mod common;
-#[path = "../tests/common/mod.rs"]
-mod engines;
-#[path = "../tests/common/schedule.rs"]
-mod oracle;
-
 use common::Arguments;
-use oracle::{Tally, check_seed};
+use khz_proof::harness::engines;
+use khz_proof::harness::schedule::{Tally, check_seed};
 
 /// Questions that the shrinker may ask.
 const TRIES: usize = 1000;

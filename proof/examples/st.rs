@@ -3,15 +3,11 @@
 #![allow(clippy::print_stdout, reason = "a program for people")]
 
 mod common;
-#[path = "../tests/common/mod.rs"]
-mod engines;
-#[path = "../tests/common/st.rs"]
-mod oracle;
 
 use std::process::ExitCode;
 
 use khz_proof::campaign::Report;
-use oracle::{Plan, Tally, check_seed};
+use khz_proof::harness::meaning::{Plan, Tally, check_seed};
 
 /// How many findings are made small.
 const REDUCED: usize = 8;

@@ -2,8 +2,6 @@
 
 #[path = "common/c.rs"]
 mod c;
-#[path = "common/mod.rs"]
-mod engines;
 
 use c::{Tally, compare_seeds};
 

@@ -1,7 +1,5 @@
 //! Programs that verify stay inside their image: they run between pages that nobody may touch. `examples/guard_pages.rs` runs more.
 
-#[path = "common/mod.rs"]
-mod engines;
 #[path = "common/guarded.rs"]
 mod guarded;
 #[path = "common/guarded_search.rs"]

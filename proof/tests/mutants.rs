@@ -6,7 +6,6 @@
 mod bases;
 #[path = "common/checked.rs"]
 mod checked;
-mod common;
 #[path = "common/measure.rs"]
 mod measure;
 
@@ -16,6 +15,7 @@ use checked::Checked;
 use khz_bytecode::verify::Rule;
 use khz_frontend::on_large_stack;
 use khz_proof::campaign::{Campaign, Figures, Report};
+use khz_proof::harness::engines;
 use khz_proof::mutate::source::mutant;
 use khz_proof::mutate::{Tally, accepted};
 use khz_proof::oracle::{Plan, compare};
@@ -65,7 +65,7 @@ fn mutants_that_verify_run_the_same_in_every_engine() {
         }
     }
     let report = search(40, |seed, Ran(count, statistics)| {
-        let makers = common::makers();
+        let makers = engines::makers();
         accepted(seed + 50_000, 30).find_map(|(number, verified)| {
             *count += 1;
             let plan = Plan { seed, scans: 2, fuel: 5_000, ..Plan::default() };

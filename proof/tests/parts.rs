@@ -1,7 +1,5 @@
 //! Native code that was cut into parts does what it does in one piece.
 
-mod common;
-
 use std::sync::Arc;
 
 use khz_jit::{Jit, JitOptions, Passes};

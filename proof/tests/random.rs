@@ -1,14 +1,12 @@
 //! Random programs in all engines, and that they reach everything.
 
-mod common;
-
 use std::sync::Arc;
 
-use common::Engines;
 use khz_bytecode::trap::TrapCode;
 use khz_jit::Passes;
 use khz_proof::bytecode::generate;
 use khz_proof::campaign::{Campaign, Report};
+use khz_proof::harness::{engines, engines::Engines};
 use khz_proof::oracle::{Maker, Plan, compare};
 use khz_proof::statistics::Statistics;
 
@@ -52,9 +50,9 @@ fn random_programs_do_the_same_in_every_engine() {
 
 #[test]
 fn native_code_is_the_same_without_passes_and_with_each_alone() {
-    let none = common::native_with(Passes::NONE);
+    let none = engines::native_with(Passes::NONE);
     let alone: Vec<_> =
-        (Passes::NAMES.iter()).map(|name| (*name, common::native_with(Passes::NONE.with(name).unwrap()))).collect();
+        (Passes::NAMES.iter()).map(|name| (*name, engines::native_with(Passes::NONE.with(name).unwrap()))).collect();
     let mut makers = vec![Maker::new("jit without passes", &none)];
     makers.extend(alone.iter().map(|(name, make)| Maker::new(name, make)));
     for seed in 20_000..20_040 {

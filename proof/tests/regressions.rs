@@ -1,13 +1,12 @@
 //! Differences that were found once, made small: `tests/regressions/*.kasm`. Each is a container that all engines must run alike.
 
-mod common;
-
 use std::fs;
 use std::path::Path;
 use std::sync::Arc;
 
 use khz_bytecode::assembler::assemble;
 use khz_bytecode::verify::verify;
+use khz_proof::harness::engines;
 use khz_proof::oracle::{Plan, compare};
 use khz_proof::statistics::Statistics;
 
@@ -24,7 +23,7 @@ fn what_differed_once_does_not_differ_again() {
         let verified = Arc::new(verified);
         for seed in 0..4 {
             let plan = Plan { seed, cuts: 3, ..Plan::default() };
-            let difference = compare(&verified, &common::makers(), &plan, &mut Statistics::default()).difference();
+            let difference = compare(&verified, &engines::makers(), &plan, &mut Statistics::default()).difference();
             if let Some(difference) = difference {
                 panic!("{}: {}", path.display(), difference.description);
             }

@@ -2,8 +2,6 @@
 //!
 //! `frontend/tests/format` formats the repository's programs in many ways; here the generated ones are formatted.
 
-mod common;
-
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -13,6 +11,7 @@ use khz_bytecode::verify::verify;
 use khz_frontend::diagnostics::has_errors;
 use khz_frontend::format::{FormatOptions, KeywordCase, format};
 use khz_frontend::{CompileOptions, SourceInput};
+use khz_proof::harness::engines;
 use khz_proof::round_trip::{Rounds, through_bytes, through_text, without_names};
 use khz_proof::st::generate;
 use khz_proof::st::print::print;
@@ -50,7 +49,7 @@ fn check_container(container: &Container, engines: usize) -> Result<(), String> 
     through_bytes(&stripped)?;
     through_text(&stripped)?;
     let verified = Arc::new(verify(container.clone()).map_err(|error| error.to_string())?);
-    without_names(&verified, &common::makers()[..engines], &ROUNDS)
+    without_names(&verified, &engines::makers()[..engines], &ROUNDS)
 }
 
 /// Runs something for many things on two threads; what is wrong comes in their order.

@@ -1,12 +1,8 @@
 //! Configurations of many tasks under the real scheduler against the brute-force model of the scheduling rules.
 
-#[path = "common/mod.rs"]
-mod engines;
-#[path = "common/schedule.rs"]
-mod oracle;
-
 use khz_proof::campaign::Campaign;
-use oracle::{Tally, check_seed};
+use khz_proof::harness::schedule::{Tally, check_seed};
+use khz_proof::harness::{engines, schedule};
 
 /// Configurations of the test; `examples/schedule.rs` runs more.
 const PLANS: u64 = 3000;
@@ -28,7 +24,7 @@ fn tasks_run_when_and_as_often_as_the_rules_say() {
     let tally = report.figures;
     assert_eq!((tally.plans, tally.unknown_values), (PLANS, 0), "{}", tally.report());
     let count = |what: &str| tally.reached.get(what).copied().unwrap_or(0);
-    for (what, least) in oracle::REACHES {
+    for (what, least) in schedule::REACHES {
         assert!(count(what) >= *least, "{what}: {} of {least}\n{}", count(what), tally.report());
     }
 }

@@ -1,16 +1,11 @@
 //! Generated Structured Text: the front end and both engines against the tree that the text came from.
 
-#[path = "common/mod.rs"]
-mod engines;
-#[path = "common/st.rs"]
-mod oracle;
-
 use khz_machine::library::{blocks, functions};
 use khz_proof::campaign::{Campaign, Report};
+use khz_proof::harness::meaning::{self, Plan, Tally, check_seed};
 use khz_proof::st::blocks::Standard;
 use khz_proof::st::functions::compares;
 use khz_proof::st::tree::{Def, Kind, Stmt};
-use oracle::{Plan, Tally, check_seed};
 
 /// Programs of the test; `examples/st.rs` runs more.
 const PROGRAMS: u64 = 8000;
@@ -135,7 +130,7 @@ fn a_tree_that_means_something_else_is_found() {
         let last = source.units.last().map_or(0, |unit| unit.body.len());
         if other.units.last().map_or(0, |unit| unit.body.len()) != last {
             tried += 1;
-            let result = oracle::check_text(&text, None, &other, seed, Plan::default(), &mut Tally::default());
+            let result = meaning::check_text(&text, None, &other, seed, Plan::default(), &mut Tally::default());
             found += usize::from(result.is_err());
         }
     }
@@ -160,7 +155,7 @@ fn a_configuration_that_means_something_else_is_found() {
                 1 => config.tasks.iter_mut().for_each(|task| task.interval_us = task.interval_us.map(|us| us * 2)),
                 _ => config.instances.iter_mut().for_each(|instance| instance.args.truncate(1)),
             }
-            let result = oracle::check_text(&text, None, &other, seed, Plan::default(), &mut Tally::default());
+            let result = meaning::check_text(&text, None, &other, seed, Plan::default(), &mut Tally::default());
             *found += usize::from(result.is_err());
         }
     }
@@ -176,7 +171,7 @@ fn a_trap_at_another_place_is_found() {
         let (text, positions) = khz_proof::st::print::print_positions(&source);
         let moved = format!("\n{text}");
         let result =
-            oracle::check_text(&moved, Some(&positions), &source, seed, Plan::default(), &mut Tally::default());
+            meaning::check_text(&moved, Some(&positions), &source, seed, Plan::default(), &mut Tally::default());
         found += usize::from(matches!(result, Err(found) if found.class.starts_with("trap place")));
     }
     assert!(found >= 10, "{found} moved traps are found");

@@ -1,13 +1,12 @@
 //! A difference in generated Structured Text becomes a small program with its traces.
 
-mod common;
-
 use std::sync::Arc;
 
 use khz_bytecode::instruction::{Instruction, NumericOp, Reader};
 use khz_bytecode::verify::{Verified, verify};
 use khz_machine::engine::Engine;
 use khz_machine::image::ImageLayout;
+use khz_proof::harness::engines;
 use khz_proof::oracle::Maker;
 use khz_proof::st::case::{Case, Round};
 use khz_proof::st::compare::{Bench, Difference, Sort};
@@ -32,13 +31,13 @@ fn confuse(
             function.code = code;
         }
         let verified = verify(container).map_err(|error| error.to_string())?;
-        common::interpreter(Arc::new(verified), layout, fuel)
+        engines::interpreter(Arc::new(verified), layout, fuel)
     }
 }
 
 /// Engines of which the last is wrong.
 fn makers<'m>(wrong: &'m khz_proof::oracle::MakeEngine<'m>) -> [Maker<'m>; 3] {
-    [Maker::new("interp", &common::interpreter), Maker::new("jit", &common::native), Maker::new("wrong", wrong)]
+    [Maker::new("interp", &engines::interpreter), Maker::new("jit", &engines::native), Maker::new("wrong", wrong)]
 }
 
 /// The first program of some seeds that differs in a wanted way, made small, and what it was before.
@@ -55,7 +54,7 @@ fn find(bench: &Bench<'_>, is_wanted: impl Fn(&Difference, &str, &[Round]) -> bo
 }
 
 fn bench<'b>(makers: &'b [Maker<'b>]) -> Bench<'b> {
-    Bench { compile: &common::compile, makers, fuel: 1_000_000, image_limit_bytes: 1 << 22 }
+    Bench { compile: &engines::compile, makers, fuel: 1_000_000, image_limit_bytes: 1 << 22 }
 }
 
 #[test]

@@ -8,8 +8,8 @@ use khz_proof::bytecode::generate;
 use khz_proof::oracle::{Difference, Plan, VERIFIER, compare, reduce};
 use khz_proof::statistics::Statistics;
 
-use super::engines::makers;
 use super::hunt::hunt;
+use khz_proof::harness::engines::makers;
 
 fn plan(seed: u64) -> Plan {
     Plan { seed, ..Plan::default() }

@@ -3,7 +3,7 @@
 use khz_bytecode::canary::{Fault, plant};
 
 use super::hunt::hunt;
-use super::oracle::{Plan, Tally, check_seed};
+use khz_proof::harness::meaning::{Plan, Tally, check_seed};
 
 /// Programs among which the fault must show.
 const PROGRAMS: u64 = 400;

@@ -3,14 +3,6 @@
 //!
 //! One file for each kind of search. A fault of the table without a test here fails [`every_fault_is_hunted`].
 
-#[path = "../common/mod.rs"]
-mod engines;
-#[path = "../common/st.rs"]
-mod oracle;
-
-#[path = "../common/schedule.rs"]
-mod schedule;
-
 mod containers;
 mod frontend;
 mod hunt;

@@ -2,9 +2,9 @@
 
 use khz_bytecode::canary::{Fault, plant};
 
-use super::engines::makers;
 use super::hunt::hunt;
-use super::schedule::{Tally, check_seed};
+use khz_proof::harness::engines::makers;
+use khz_proof::harness::schedule::{Tally, check_seed};
 
 /// Configurations among which the fault must show.
 const PLANS: u64 = 200;

@@ -19,7 +19,7 @@ use khz_proof::st::print::print;
 use khz_proof::st::shrink::shrink_case;
 use khz_proof::st::tree::{Def, Source, Ty};
 
-use super::engines;
+use khz_proof::harness::engines;
 
 pub const SCANS: usize = 4;
 const IMAGE_LIMIT_BYTES: u64 = 1 << 22;

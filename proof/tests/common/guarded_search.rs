@@ -8,8 +8,8 @@ use khz_proof::mutate::accepted;
 use khz_proof::oracle::{Plan, compare};
 use khz_proof::statistics::Statistics;
 
-use super::engines::makers;
 use super::guarded::{Guarded, Side};
+use khz_proof::harness::engines::makers;
 
 /// Scans of each program.
 pub const SCANS: u32 = 100;

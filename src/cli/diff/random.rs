@@ -1,17 +1,11 @@
 //! `khz diff --random N`: generated programs, Structured Text against its own meaning and containers against the third evaluator, in both engines.
-//!
-//! The oracles stand beside the tests of `khz-proof`, which use them too: they see the compiler and the engines, and that crate does not.
-
-#[path = "../../../proof/tests/common/mod.rs"]
-mod engines;
-#[path = "../../../proof/tests/common/st.rs"]
-mod oracle;
 
 use std::io::{IsTerminal, Write};
 use std::sync::Arc;
 
 use khz_proof::bytecode;
 use khz_proof::campaign::{Campaign, Figures, Progress};
+use khz_proof::harness::{engines, meaning};
 use khz_proof::oracle::{Plan, compare, reduce as reduce_container};
 use khz_proof::st;
 use khz_proof::st::case::{Case, Round};
@@ -34,7 +28,7 @@ const TRIES: usize = 2000;
 /// What was reached.
 #[derive(Default)]
 struct Reached {
-    text: oracle::Tally,
+    text: meaning::Tally,
     /// Programs of Structured Text that both engines also ran with values from outside.
     with_inputs: u64,
     containers: Statistics,
@@ -120,7 +114,7 @@ fn check(args: &DiffArgs, programs: Programs, seed: u64, reached: &mut Reached) 
         return Some(format!("Structured Text, {} and {}: {}", found.left, found.right, found.description));
     }
     reached.with_inputs += 1;
-    if let Some(found) = oracle::check_seed(seed, oracle::Plan::default(), &mut reached.text, 0) {
+    if let Some(found) = meaning::check_seed(seed, meaning::Plan::default(), &mut reached.text, 0) {
         return Some(format!("Structured Text against its meaning: {}", first_lines(&found, 2)));
     }
     if !programs.has_container(seed) {
@@ -144,7 +138,7 @@ fn smallest(args: &DiffArgs, programs: Programs, seed: u64) -> Option<String> {
     if let Some(small) = small {
         return Some(small.to_string());
     }
-    if let Some(found) = oracle::check_seed(seed, oracle::Plan::default(), &mut oracle::Tally::default(), TRIES) {
+    if let Some(found) = meaning::check_seed(seed, meaning::Plan::default(), &mut meaning::Tally::default(), TRIES) {
         return Some(found);
     }
     if !programs.has_container(seed) {

@@ -1,11 +1,18 @@
 //! Plans of many tasks under the real scheduler, and the comparison with the model: what the scheduler's clock, drivers and engines see is
 //! written down as the model's events.
-#![allow(dead_code, reason = "each user takes its part")]
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::sync::{Arc, Mutex, MutexGuard};
 
+use crate::campaign;
+use crate::oracle::Maker;
+use crate::schedule::plan::{Command, Form, Plan, Time, Trigger};
+use crate::schedule::trace::{
+    Code, Ending, Event, Figures, Next, Observed, Run, State, Statistics, TaskFigures, Values, difference,
+};
+use crate::schedule::world::{Delay, World};
+use crate::schedule::{assembly, generate, predict, shrink, text};
 use khz_bytecode::assembler::assemble;
 use khz_bytecode::container::Container;
 use khz_bytecode::verify::{Verified, verify};
@@ -14,14 +21,6 @@ use khz_machine::engine::{Engine, Entry, Limits};
 use khz_machine::image::{Image, ImageLayout};
 use khz_machine::trap::{Trap, TrapCode};
 use khz_machine::variables::{Variable, VariableTable, VariableValue};
-use khz_proof::campaign;
-use khz_proof::oracle::Maker;
-use khz_proof::schedule::plan::{Command, Form, Plan, Time, Trigger};
-use khz_proof::schedule::trace::{
-    Code, Ending, Event, Figures, Next, Observed, Run, State, Statistics, TaskFigures, Values, difference,
-};
-use khz_proof::schedule::world::{Delay, World};
-use khz_proof::schedule::{assembly, generate, predict, shrink, text};
 use khz_scheduler::statistics::Summary;
 use khz_scheduler::time::DurationNs;
 use khz_scheduler::{
@@ -71,16 +70,22 @@ pub const REACHES: &[(&str, u64)] = &[
 /// What a search reached.
 #[derive(Default, Debug)]
 pub struct Tally {
+    /// Plans that were carried out.
     pub plans: u64,
+    /// Rounds in which a task ran.
     pub rounds: u64,
+    /// Cycles of tasks.
     pub cycles: u64,
+    /// Values of variables that were compared.
     pub values: u64,
+    /// Values of variables that the container left out.
     pub unknown_values: u64,
     /// How often each thing happened.
     pub reached: BTreeMap<String, u64>,
 }
 
 impl Tally {
+    /// The figures, for people.
     pub fn report(&self) -> String {
         let mut text = format!(
             "{} plans, {} rounds, {} cycles, {} values compared, {} of variables that the container left out\n",
@@ -164,7 +169,6 @@ impl campaign::Figures for Tally {
 /// What the hooks, the clock and the engine share.
 struct Shared {
     world: World,
-    time: Time,
     now: u64,
     observed: Observed,
     names: VariableTable,
@@ -363,6 +367,7 @@ impl Observer for Onlooker {
 
 /// What was seen of a run in one engine.
 pub struct Seen {
+    /// Events and figures.
     pub observed: Observed,
     traps: Vec<Trap>,
     images: Vec<u64>,
@@ -377,7 +382,6 @@ enum Held {
 
 /// A plan under the scheduler.
 struct Bench<'p> {
-    plan: &'p Plan,
     link: Link,
     io: Driver,
     inputs: Rows<'p>,
@@ -541,6 +545,9 @@ impl Bench<'_> {
 }
 
 /// The container of a plan.
+///
+/// # Errors
+/// The words of what refused it.
 pub fn container(plan: &Plan) -> Result<Container, String> {
     if plan.form == Form::Assembly {
         return assemble(&assembly::print(plan)).map_err(|error| format!("the assembly is refused: {error}"));
@@ -557,6 +564,9 @@ pub fn container(plan: &Plan) -> Result<Container, String> {
 }
 
 /// Runs a plan in one engine.
+///
+/// # Errors
+/// What kept it from running.
 pub fn observe(plan: &Plan, verified: &Arc<Verified>, maker: &Maker<'_>) -> Result<Seen, String> {
     let layout = ImageLayout::new(verified.container(), IMAGE_LIMIT_BYTES).map_err(|error| error.to_string())?;
     let inner = (maker.make)(verified.clone(), &layout, plan.needs_fuel())?;
@@ -566,7 +576,6 @@ pub fn observe(plan: &Plan, verified: &Arc<Verified>, maker: &Maker<'_>) -> Resu
     let known = variables.iter().map(Option::is_some).collect();
     let link = Arc::new(Mutex::new(Shared {
         world: World::new(plan),
-        time: plan.time,
         now: 0,
         observed: Observed { known, ..Observed::default() },
         names,
@@ -579,7 +588,6 @@ pub fn observe(plan: &Plan, verified: &Arc<Verified>, maker: &Maker<'_>) -> Resu
     let engine = Box::new(TimedEngine { inner, link: link.clone() });
     let clock = Box::new(TestClock { link: link.clone(), virtual_clock: VirtualClock::new(), time: plan.time });
     let mut bench = Bench {
-        plan,
         io: Driver { link: link.clone(), poll_ns: plan.input_poll_ns },
         inputs: Rows { plan, next: 0 },
         observer: Onlooker { link: link.clone() },
@@ -602,6 +610,9 @@ pub fn observe(plan: &Plan, verified: &Arc<Verified>, maker: &Maker<'_>) -> Resu
 }
 
 /// Compares a plan's runs with the model and with each other; the first difference.
+///
+/// # Errors
+/// The difference, for people.
 pub fn check(plan: &Plan, makers: &[Maker<'_>], tally: &mut Tally) -> Result<(), String> {
     let container = container(plan)?;
     let verified = Arc::new(verify(container).map_err(|error| format!("the container is refused: {error}"))?);

@@ -1,10 +1,12 @@
 //! The engines that the tests compare.
-#![allow(dead_code, reason = "each test file uses its part")]
 
 use std::cell::Cell;
 use std::rc::Rc;
 use std::sync::Arc;
 
+use crate::oracle::{Forms, MakeEngine, Maker};
+use crate::st::compare::{FILE, Refusal};
+use crate::statistics::Statistics;
 use khz_bytecode::container::Container;
 use khz_bytecode::verify::Verified;
 use khz_frontend::diagnostics::Severity;
@@ -14,16 +16,19 @@ use khz_interp::{Interpreter, InterpreterOptions};
 use khz_jit::{Jit, JitOptions, Passes};
 use khz_machine::engine::Engine;
 use khz_machine::image::ImageLayout;
-use khz_proof::oracle::{Forms, MakeEngine, Maker};
-use khz_proof::st::compare::{FILE, Refusal};
-use khz_proof::statistics::Statistics;
 
 /// Makes an interpreter.
+///
+/// # Errors
+/// None: it takes every verified container.
 pub fn interpreter(verified: Arc<Verified>, layout: &ImageLayout, fuel: bool) -> Result<Box<dyn Engine>, String> {
     Ok(Box::new(Interpreter::new(verified, layout, InterpreterOptions { fuel })))
 }
 
 /// Makes native code with every pass.
+///
+/// # Errors
+/// What the native engine can not compile.
 pub fn native(verified: Arc<Verified>, layout: &ImageLayout, fuel: bool) -> Result<Box<dyn Engine>, String> {
     let options = JitOptions { fuel, ..JitOptions::default() };
     let jit = Jit::new(verified, layout, options).map_err(|error| error.to_string())?;
@@ -56,6 +61,7 @@ pub struct Engines {
 }
 
 impl Engines {
+    /// Those of a seed.
     pub fn of_seed(seed: u64) -> Engines {
         let fired = Rc::new(Cell::new(Passes::NONE));
         let noted = Rc::clone(&fired);
@@ -76,6 +82,7 @@ impl Engines {
         Engines { fired, native: Box::new(native), variant }
     }
 
+    /// Makes each of them.
     pub fn makers(&self) -> Vec<Maker<'_>> {
         let mut makers = vec![Maker::new("interp", &interpreter), Maker::new("jit", &*self.native)];
         let variant = self.variant.as_ref();
@@ -96,6 +103,9 @@ pub fn without(off: &str) -> Passes {
 }
 
 /// Compiles a text to its first container; the code and the words of its first error.
+///
+/// # Errors
+/// The code and the words of the first error.
 pub fn compile(text: &str) -> Result<Container, Refusal> {
     let input = SourceInput { name: FILE.to_string(), bytes: text.as_bytes().to_vec() };
     let compilation = khz_frontend::compile(&[input], &CompileOptions::default());

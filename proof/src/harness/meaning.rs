@@ -1,9 +1,18 @@
 //! The oracle of generated Structured Text: compiled and run in both engines, against the tree run directly.
-#![allow(dead_code, reason = "each user takes its part")]
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use crate::campaign::Figures;
+use crate::random::Random;
+use crate::st::coverage::Coverage;
+use crate::st::evaluate::{Evaluator, Stop};
+use crate::st::position::Positions;
+use crate::st::print::{print, print_positions};
+use crate::st::rounds::Rounds;
+use crate::st::shrink::shrink;
+use crate::st::tree::{Def, Source, Ty, Value};
+use crate::st::{Size, generate};
 use khz_bytecode::container::{Container, SystemVariableKind};
 use khz_bytecode::trap::TrapCode;
 use khz_bytecode::verify::{Verified, verify};
@@ -13,16 +22,6 @@ use khz_machine::image::{Image, ImageLayout};
 use khz_machine::report::describe;
 use khz_machine::trap::{CodePlace, Trap};
 use khz_machine::variables::{Variable, VariableTable, VariableValue};
-use khz_proof::campaign::Figures;
-use khz_proof::random::Random;
-use khz_proof::st::coverage::Coverage;
-use khz_proof::st::evaluate::{Evaluator, Stop};
-use khz_proof::st::position::Positions;
-use khz_proof::st::print::{print, print_positions};
-use khz_proof::st::rounds::Rounds;
-use khz_proof::st::shrink::shrink;
-use khz_proof::st::tree::{Def, Source, Ty, Value};
-use khz_proof::st::{Size, generate};
 use khz_scheduler::{Hooks, LoadOptions, NoInputs, NoIo, NoObserver, Resource, Running, VirtualClock};
 
 /// What the compiler may say of a generated program: constants alone divide by zero, index outside the bounds, or leave a subrange.
@@ -51,10 +50,15 @@ impl Default for Plan {
 /// What a search reached.
 #[derive(Default)]
 pub struct Tally {
+    /// Programs that were run.
     pub programs: u64,
+    /// Their scans or rounds.
     pub scans: u64,
+    /// Values of variables that were compared.
     pub values: u64,
+    /// Programs whose own meaning did not come to an end in a bounded number of steps.
     pub too_long: u64,
+    /// Globals that nothing uses, which the compiler left out.
     pub unused: u64,
     /// Refused because the compiler saw a trap that constants alone make, which the generator does not look for.
     pub refused: u64,
@@ -62,8 +66,11 @@ pub struct Tally {
     pub with_fuel: u64,
     /// Programs whose passes were noted, and of how many each pass changed something.
     pub noted: u64,
+    /// See `noted`.
     pub passes: BTreeMap<&'static str, u64>,
+    /// Programs by the trap that ended them.
     pub traps: BTreeMap<String, u64>,
+    /// What of the language was in them.
     pub coverage: Coverage,
 }
 
@@ -84,6 +91,7 @@ impl Figures for Tally {
 }
 
 impl Tally {
+    /// The figures, for people.
     pub fn report(&self) -> String {
         format!(
             "{} programs, {} scans, {} values compared, {} without an end in time, {} values of unused globals, {} refused for a constant trap, {} with fuel too\ntraps {:?}\npasses of {} programs {:?}\n{}",
@@ -105,7 +113,9 @@ impl Tally {
 /// A difference: what kind, for the shrinker, and the words for people.
 #[derive(Debug)]
 pub struct Found {
+    /// Its kind: a smaller program must differ in the same way.
     pub class: String,
+    /// What differs, for people.
     pub text: String,
 }
 
@@ -157,12 +167,18 @@ fn set_time(image: &mut Image, container: &Container, now: i64) {
 }
 
 /// Compares one program; `seed` gives the times of its rounds.
+///
+/// # Errors
+/// The first difference.
 pub fn check(source: &Source, seed: u64, plan: Plan, tally: &mut Tally) -> Result<(), Found> {
     let (text, positions) = print_positions(source);
     check_text(&text, Some(&positions), source, seed, plan, tally)
 }
 
 /// Compares a text with a tree, and where things stand in the text if that is known.
+///
+/// # Errors
+/// The first difference.
 pub fn check_text(
     text: &str,
     positions: Option<&Positions>,
