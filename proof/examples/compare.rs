@@ -1,4 +1,4 @@
-//! Compares engines over many random containers: `compare FIRST_SEED COUNT [--threads N] [--scans N] [--cuts N] [--size 0..3] [interp|jit]…`. What differs
+//! Compares engines over many random containers: `compare FIRST_SEED COUNT [--threads N] [--scans N] [--cuts N] [--size 0..3] [--parts ITEMS] [interp|jit]…`. What differs
 //! is printed small; the exit status says whether anything did.
 #![allow(clippy::print_stdout, reason = "a program for people")]
 
@@ -17,7 +17,7 @@ use khz_proof::statistics::Statistics;
 const REDUCED: usize = 6;
 
 fn main() -> ExitCode {
-    let arguments = common::Arguments::read(1000, &["scans", "cuts", "size"]);
+    let arguments = common::Arguments::read(1000, &["scans", "cuts", "size", "parts"]);
     let plan = |seed| Plan {
         seed,
         scans: arguments.option("scans", 10) as u32,
@@ -29,8 +29,12 @@ fn main() -> ExitCode {
         Some(size) => generate_sized(seed, *size),
         None => generate(seed),
     };
+    let engines_of = |seed| match arguments.option("parts", 0) {
+        0 => Engines::of_seed(seed),
+        items => Engines::in_parts(seed, items as usize),
+    };
     let look = |seed, statistics: &mut Statistics| {
-        let engines = Engines::of_seed(seed);
+        let engines = engines_of(seed);
         let mut makers = engines.makers();
         makers.retain(|maker| arguments.wants(maker.name));
         let found = compare(&Arc::new(generate(seed)), &makers, &plan(seed), statistics).difference();
@@ -45,7 +49,7 @@ fn main() -> ExitCode {
         if number < REDUCED && !finding.description.starts_with("panic") {
             let verified = Arc::new(generate(seed));
             let Some(found) = look(seed, &mut Statistics::default()) else { continue };
-            let engines = Engines::of_seed(seed);
+            let engines = engines_of(seed);
             let only: Vec<_> = engines.makers().into_iter().filter(|maker| maker.name == found.engine).collect();
             let (shrunk, description) = reduce(&verified, &only, &plan(seed), 4000);
             println!("{} instructions\n{description}", shrunk.instructions);

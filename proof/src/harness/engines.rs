@@ -44,16 +44,28 @@ pub fn native_with(passes: Passes) -> impl Fn(Arc<Verified>, &ImageLayout, bool)
     }
 }
 
+/// Makes native code with every pass, cut into parts of some items.
+pub fn native_in_parts(items: usize) -> impl Fn(Arc<Verified>, &ImageLayout, bool) -> Result<Box<dyn Engine>, String> {
+    move |verified, layout, fuel| {
+        let options = JitOptions { fuel, part_items: items, ..JitOptions::default() };
+        let jit = Jit::new(verified, layout, options).map_err(|error| error.to_string())?;
+        Ok(Box::new(jit))
+    }
+}
+
 /// Every engine.
 pub fn makers() -> Vec<Maker<'static>> {
     vec![Maker::new("interp", &interpreter), Maker::new("jit", &native)]
 }
 
-/// One seed in this many also runs in native code without one of the passes.
+/// One seed in this many also runs in native code of another kind.
 const VARIANT_EVERY: u64 = 8;
 
+/// Items of the parts that native code is cut into in some of the other kinds: generated functions are too short to be cut as they are.
+const SMALL_PARTS: [usize; 3] = [4, 12, 40];
+
 /// The engines for one seed of a search: all of them, native code that notes which passes changed something, and now and then native
-/// code without one pass, which one by the seed.
+/// code of another kind, which one by the seed: without one of the passes, or in small parts.
 pub struct Engines {
     fired: Rc<Cell<Passes>>,
     native: Box<MakeEngine<'static>>,
@@ -63,10 +75,15 @@ pub struct Engines {
 impl Engines {
     /// Those of a seed.
     pub fn of_seed(seed: u64) -> Engines {
+        Engines::in_parts(seed, JitOptions::default().part_items)
+    }
+
+    /// Those of a seed, native code in parts of some items.
+    pub fn in_parts(seed: u64, part_items: usize) -> Engines {
         let fired = Rc::new(Cell::new(Passes::NONE));
         let noted = Rc::clone(&fired);
         let native = move |verified: Arc<Verified>, layout: &ImageLayout, fuel| {
-            let options = JitOptions { fuel, note_passes: true, ..JitOptions::default() };
+            let options = JitOptions { fuel, note_passes: true, part_items, ..JitOptions::default() };
             let jit = Jit::new(verified, layout, options).map_err(|error| error.to_string())?;
             let fired = jit.passes_fired().unwrap_or(Passes::NONE);
             let both = fired.rows().filter(|(_, fired)| *fired).try_fold(noted.get(), |all, (name, _)| all.with(name));
@@ -75,9 +92,18 @@ impl Engines {
             Ok(made)
         };
         let variant = seed.is_multiple_of(VARIANT_EVERY).then(|| {
-            let off = Passes::NAMES[(seed / VARIANT_EVERY) as usize % Passes::NAMES.len()];
-            let make: Box<MakeEngine<'static>> = Box::new(native_with(without(off)));
-            (format!("jit without {off}"), make)
+            let kind = (seed / VARIANT_EVERY) as usize % (Passes::NAMES.len() + SMALL_PARTS.len());
+            match Passes::NAMES.get(kind) {
+                Some(off) => {
+                    let make: Box<MakeEngine<'static>> = Box::new(native_with(without(off)));
+                    (format!("jit without {off}"), make)
+                }
+                None => {
+                    let items = SMALL_PARTS[kind - Passes::NAMES.len()];
+                    let make: Box<MakeEngine<'static>> = Box::new(native_in_parts(items));
+                    (format!("jit in parts of {items}"), make)
+                }
+            }
         });
         Engines { fired, native: Box::new(native), variant }
     }
