@@ -91,20 +91,7 @@ impl Engines {
             let made: Box<dyn Engine> = Box::new(jit);
             Ok(made)
         };
-        let variant = seed.is_multiple_of(VARIANT_EVERY).then(|| {
-            let kind = (seed / VARIANT_EVERY) as usize % (Passes::NAMES.len() + SMALL_PARTS.len());
-            match Passes::NAMES.get(kind) {
-                Some(off) => {
-                    let make: Box<MakeEngine<'static>> = Box::new(native_with(without(off)));
-                    (format!("jit without {off}"), make)
-                }
-                None => {
-                    let items = SMALL_PARTS[kind - Passes::NAMES.len()];
-                    let make: Box<MakeEngine<'static>> = Box::new(native_in_parts(items));
-                    (format!("jit in parts of {items}"), make)
-                }
-            }
-        });
+        let variant = variant(seed);
         Engines { fired, native: Box::new(native), variant }
     }
 
@@ -120,6 +107,24 @@ impl Engines {
     pub fn note(&self, statistics: &mut Statistics) {
         self.fired.get().rows().for_each(|(name, fired)| statistics.pass(name, fired));
     }
+}
+
+/// Native code of another kind, which one by the seed, for one seed in [`VARIANT_EVERY`]; its name and how it is made.
+pub fn variant(seed: u64) -> Option<(String, Box<MakeEngine<'static>>)> {
+    seed.is_multiple_of(VARIANT_EVERY).then(|| {
+        let kind = (seed / VARIANT_EVERY) as usize % (Passes::NAMES.len() + SMALL_PARTS.len());
+        match Passes::NAMES.get(kind) {
+            Some(off) => {
+                let make: Box<MakeEngine<'static>> = Box::new(native_with(without(off)));
+                (format!("jit without {off}"), make)
+            }
+            None => {
+                let items = SMALL_PARTS[kind - Passes::NAMES.len()];
+                let make: Box<MakeEngine<'static>> = Box::new(native_in_parts(items));
+                (format!("jit in parts of {items}"), make)
+            }
+        }
+    })
 }
 
 /// Every pass but one.

@@ -4,7 +4,9 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::campaign::Figures;
+use crate::oracle::Maker;
 use crate::random::Random;
+use crate::st::constants::has_trap;
 use crate::st::coverage::Coverage;
 use crate::st::evaluate::{Evaluator, Stop};
 use crate::st::position::Positions;
@@ -13,21 +15,24 @@ use crate::st::rounds::Rounds;
 use crate::st::shrink::shrink;
 use crate::st::tree::{Def, Source, Ty, Value};
 use crate::st::{Size, generate};
-use khz_bytecode::container::{Container, SystemVariableKind};
+use khz_bytecode::container::{Container, SystemVariableKind, TaskType};
 use khz_bytecode::trap::TrapCode;
 use khz_bytecode::verify::{Verified, verify};
-use khz_jit::{Jit, JitOptions};
+use khz_jit::{Jit, JitOptions, Passes};
 use khz_machine::engine::{DeadlineCell, Engine, Entry, Fuel, Limits};
 use khz_machine::image::{Image, ImageLayout};
 use khz_machine::report::describe;
 use khz_machine::trap::{CodePlace, Trap};
 use khz_machine::variables::{Variable, VariableTable, VariableValue};
-use khz_scheduler::{Hooks, LoadOptions, NoInputs, NoIo, NoObserver, Resource, Running, VirtualClock};
+use khz_scheduler::{
+    FaultPlace, FaultReport, Hooks, LoadOptions, NoInputs, NoIo, NoObserver, Observer, Resource, Running, TaskIndex,
+    TimeNs, VirtualClock,
+};
 
-/// What the compiler may say of a generated program: constants alone divide by zero, index outside the bounds, or leave a subrange.
-const REFUSED: [&str; 3] = ["refused T0007", "refused T0006", "refused T0008"];
 const STEPS: u64 = 100_000;
 const FUEL: u64 = 1 << 40;
+/// The watchdog of tasks whose code charges fuel: longer than anything here runs.
+const WATCHDOG_US: u64 = 1_000_000_000;
 const IMAGE_LIMIT_BYTES: u64 = 1 << 22;
 
 /// How much is done with each program.
@@ -60,8 +65,12 @@ pub struct Tally {
     pub too_long: u64,
     /// Globals that nothing uses, which the compiler left out.
     pub unused: u64,
-    /// Refused because the compiler saw a trap that constants alone make, which the generator does not look for.
+    /// Refused where the tree, too, has a trap that constants alone make: no generated program has one, only what was made of one.
     pub refused: u64,
+    /// Programs that native code of another kind ran too: without one of its passes, or in small parts.
+    pub with_variant: u64,
+    /// Task cycles whose place in their round was compared.
+    pub cycles: u64,
     /// Programs that code with fuel ran too.
     pub with_fuel: u64,
     /// Programs whose passes were noted, and of how many each pass changed something.
@@ -82,6 +91,8 @@ impl Figures for Tally {
         self.too_long += later.too_long;
         self.unused += later.unused;
         self.refused += later.refused;
+        self.with_variant += later.with_variant;
+        self.cycles += later.cycles;
         self.with_fuel += later.with_fuel;
         self.noted += later.noted;
         later.passes.into_iter().for_each(|(name, count)| *self.passes.entry(name).or_default() += count);
@@ -93,19 +104,29 @@ impl Figures for Tally {
 impl Tally {
     /// The figures, for people.
     pub fn report(&self) -> String {
+        let unmet = |names: Vec<&'static str>, met: &dyn Fn(&str) -> bool| {
+            let total = names.len();
+            let missing: Vec<_> = names.into_iter().filter(|name| !met(name)).collect();
+            format!("{} of {total}, not reached: {missing:?}", total - missing.len())
+        };
+        let traps =
+            unmet(TrapCode::ALL.iter().map(|code| code.name()).collect(), &|name| self.traps.contains_key(name));
+        let passes = unmet(Passes::NAMES.to_vec(), &|name| self.passes.get(name).is_some_and(|count| *count > 0));
         format!(
-            "{} programs, {} scans, {} values compared, {} without an end in time, {} values of unused globals, {} refused for a constant trap, {} with fuel too\ntraps {:?}\npasses of {} programs {:?}\n{}",
-            self.programs,
-            self.scans,
-            self.values,
-            self.too_long,
-            self.unused,
-            self.refused,
-            self.with_fuel,
+            "{}\ntraps {traps}; programs {:?}\npasses {passes}; programs of {} {:?}\n{} programs compared, {} refused for a constant trap of the tree; {} scans, {} values, {} task cycles; {} without an end in time, {} values of unused globals; {} also with fuel, {} also without one pass or in small parts",
+            self.coverage.report(),
             self.traps,
             self.noted,
             self.passes,
-            self.coverage.report()
+            self.programs,
+            self.refused,
+            self.scans,
+            self.values,
+            self.cycles,
+            self.too_long,
+            self.unused,
+            self.with_fuel,
+            self.with_variant,
         )
     }
 }
@@ -189,7 +210,8 @@ pub fn check_text(
 ) -> Result<(), Found> {
     let container = match super::engines::compile(text) {
         Ok(container) => container,
-        Err(refusal) if REFUSED.contains(&format!("refused {}", refusal.code).as_str()) => {
+        // A program that is generated has none; what is made of one on the way to a smaller one may.
+        Err(_) if has_trap(source) => {
             tally.refused += 1;
             return Ok(());
         }
@@ -205,11 +227,14 @@ pub fn check_text(
         note_passes(&verified, &layout, tally)?;
     }
     let judge = Judge { source, verified: &verified, positions, names: VariableTable::of(verified.container()) };
-    let random = Random::new(seed ^ 0x7469_6D65);
+    let with_fuel = plan.fuel != 0 && seed % plan.fuel == 1 % plan.fuel;
+    let machines = judge.machines(&layout, with_fuel, seed)?;
+    tally.with_fuel += u64::from(machines.iter().any(|machine| machine.fuel));
+    tally.with_variant += u64::from(super::engines::variant(seed).is_some());
     if source.config.is_some() {
-        judge.rounds(&layout, plan, tally)
+        judge.rounds(machines, plan, tally)
     } else {
-        judge.scans(&layout, seed, plan, random, tally)
+        judge.scans(machines, plan, Random::new(seed ^ 0x7469_6D65), tally)
     }
 }
 
@@ -315,19 +340,19 @@ impl Judge<'_> {
         Ok(())
     }
 
-    fn machines(&self, layout: &ImageLayout, with_fuel: bool) -> Result<Vec<Machine>, Found> {
+    /// Every engine, with fuel too where it is wanted, and perhaps native code of another kind.
+    fn machines(&self, layout: &ImageLayout, with_fuel: bool, seed: u64) -> Result<Vec<Machine>, Found> {
+        let variant = super::engines::variant(seed);
+        let mut makers = super::engines::makers();
+        makers.extend(variant.as_ref().map(|(name, make)| Maker::new(name, &**make)));
         let mut machines = Vec::new();
         for fuel in [false, true].into_iter().filter(|fuel| with_fuel || !fuel) {
-            for maker in super::engines::makers() {
+            for maker in &makers {
                 let made = (maker.make)(self.verified.clone(), layout, fuel);
                 let engine = made.map_err(|error| found("engine", error))?;
                 let name = format!("{}{}", maker.name, if fuel { " with fuel" } else { "" });
-                machines.push(Machine {
-                    name,
-                    engine,
-                    image: Image::new(layout.clone(), self.verified.container()),
-                    fuel,
-                });
+                let image = Image::new(layout.clone(), self.verified.container());
+                machines.push(Machine { name, engine, image, fuel });
             }
         }
         Ok(machines)
@@ -336,15 +361,11 @@ impl Judge<'_> {
     /// Every program instance in every scan, at times of the seed.
     fn scans(
         &self,
-        layout: &ImageLayout,
-        seed: u64,
+        mut machines: Vec<Machine>,
         plan: Plan,
         mut random: Random,
         tally: &mut Tally,
     ) -> Result<(), Found> {
-        let with_fuel = plan.fuel != 0 && seed % plan.fuel == 1 % plan.fuel;
-        tally.with_fuel += u64::from(with_fuel);
-        let mut machines = self.machines(layout, with_fuel)?;
         for machine in &mut machines {
             run(machine, Entry::Init).map_err(|trap| found("init", format!("{trap:?}")))?;
         }
@@ -369,13 +390,8 @@ impl Judge<'_> {
                 self.same_values(&place, &evaluator, &places, &machine.image, tally)
                     .map_err(|found| after(found, &expected))?;
             }
-            let (first, others) = machines.split_first().ok_or_else(|| found("engine", "none"))?;
-            for other in others {
-                if let Some(at) = first.image.first_difference(&other.image) {
-                    let text = format!("scan {scan}: {} and {} differ at {at}", first.name, other.name);
-                    return Err(found("engines", text));
-                }
-            }
+            let images = machines.iter().map(|machine| (machine.name.as_str(), &machine.image));
+            same_images(&format!("scan {scan}"), images)?;
             if let Err(Stop::Trap(code, _)) = expected {
                 *tally.traps.entry(code.to_string()).or_default() += 1;
                 return Ok(());
@@ -386,69 +402,163 @@ impl Judge<'_> {
     }
 
     /// The rounds of a CONFIGURATION in the scheduler, on the virtual clock.
-    fn rounds(&self, layout: &ImageLayout, plan: Plan, tally: &mut Tally) -> Result<(), Found> {
+    fn rounds(&self, machines: Vec<Machine>, plan: Plan, tally: &mut Tally) -> Result<(), Found> {
         let mut evaluator = Evaluator::new(self.source, STEPS);
         let started = evaluator.start();
         let mut running: Vec<(String, Resource<Running>)> = Vec::new();
-        for machine in self.machines(layout, false)? {
-            let options = LoadOptions { max_image_bytes: IMAGE_LIMIT_BYTES, ..LoadOptions::default() };
-            let clock = Box::new(VirtualClock::new());
-            let loaded = Resource::load(self.verified.clone(), machine.engine, clock, &options);
+        for Machine { name, engine, fuel, .. } in machines {
+            let watchdog_us = if fuel { WATCHDOG_US } else { 0 };
+            let options = LoadOptions { max_image_bytes: IMAGE_LIMIT_BYTES, watchdog_us, ..LoadOptions::default() };
+            let loaded = Resource::load(self.verified.clone(), engine, Box::new(VirtualClock::new()), &options);
             let stopped = loaded.map_err(|error| found("load", error.to_string()))?;
+            let place = format!("{name} start");
             let result = match stopped.start() {
                 Ok(resource) => {
-                    running.push((machine.name.clone(), resource));
+                    running.push((name, resource));
                     Ok(())
                 }
                 Err(faulted) => Err(faulted.report().trap),
             };
-            self.same_ending(&format!("{} start", machine.name), &evaluator, &started, &result)?;
+            self.same_ending(&place, &evaluator, &started, &result)?;
         }
         if started.is_err() {
             return Ok(());
         }
         let places = self.places(&evaluator);
         let mut rounds = Rounds::new(self.source);
-        for round in 0..plan.scans {
+        for _ in 0..plan.scans {
             let expected = rounds.run(&mut evaluator);
             if expected == Err(Stop::TooLong) {
                 tally.too_long += 1;
                 return Ok(());
             }
             tally.scans += 1;
-            let mut next = Vec::new();
-            for (name, resource) in running {
-                let place = format!("{name} round {round} at {} ns", rounds.now_ns());
-                let hooks = &mut Hooks { io: &mut NoIo, inputs: &mut NoInputs, observer: &mut NoObserver };
-                match resource.run_round(hooks) {
-                    Ok((mut resource, ran)) => {
-                        self.same_ending(&place, &evaluator, &expected, &Ok(()))?;
-                        if ran.time.0 != rounds.now_ns() {
-                            return Err(found("time", format!("{place}: the round was at {}", ran.time.0)));
-                        }
-                        self.same_values(&place, &evaluator, &places, resource.image(), tally)?;
-                        let wake = resource.next_wake(hooks);
-                        resource.wait(wake);
-                        next.push((name, resource));
-                    }
-                    Err(faulted) => {
-                        self.same_ending(&place, &evaluator, &expected, &Err(faulted.report().trap))?;
-                        self.same_values(&place, &evaluator, &places, faulted.image(), tally)
-                            .map_err(|found| after(found, &expected))?;
-                    }
-                }
-            }
+            let side = RoundSide { evaluator: &evaluator, rounds: &rounds, expected: &expected, places: &places };
+            running = self.round(running, &side, tally)?;
             if let Err(Stop::Trap(code, _)) = expected {
                 *tally.traps.entry(code.to_string()).or_default() += 1;
                 return Ok(());
             }
-            running = next;
             if !rounds.wait(&evaluator) {
                 return Ok(());
             }
         }
         Ok(())
     }
+
+    /// The same round in every engine; those that go on.
+    fn round(
+        &self,
+        running: Vec<(String, Resource<Running>)>,
+        side: &RoundSide<'_>,
+        tally: &mut Tally,
+    ) -> Result<Vec<(String, Resource<Running>)>, Found> {
+        let RoundSide { evaluator, rounds, expected, places } = *side;
+        let at = format!("round at {} ns", rounds.now_ns());
+        let (mut next, mut faults) = (Vec::new(), Vec::new());
+        for (name, resource) in running {
+            let place = format!("{name}, {at}");
+            let mut cycles = Cycles::default();
+            let hooks = &mut Hooks { io: &mut NoIo, inputs: &mut NoInputs, observer: &mut cycles };
+            match resource.run_round(hooks) {
+                Ok((resource, _)) => {
+                    self.same_ending(&place, evaluator, expected, &Ok(()))?;
+                    self.same_cycles(&place, rounds, &cycles.rounds, tally)?;
+                    self.same_values(&place, evaluator, places, resource.image(), tally)?;
+                    next.push((name, resource));
+                }
+                Err(faulted) => {
+                    let FaultReport { place: fault, trap, time, .. } = *faulted.report();
+                    self.same_ending(&place, evaluator, expected, &Err(trap))?;
+                    // Of a round that trapped only the last task is reported.
+                    let task = match fault {
+                        FaultPlace::Task { task, .. } => Some(self.task(task)),
+                        FaultPlace::Init | FaultPlace::Startup => None,
+                    };
+                    let last = rounds.ran().last().map(|task| self.tree_task(*task));
+                    if time.0 != rounds.now_ns() || task != last {
+                        let text = format!("{place}: {task:?} trapped at {} ns instead of {last:?}", time.0);
+                        return Err(found("tasks", text));
+                    }
+                    self.same_values(&place, evaluator, places, faulted.image(), tally)
+                        .map_err(|found| after(found, expected))?;
+                    faults.push((name, faulted));
+                }
+            }
+        }
+        same_images(&at, next.iter().map(|(name, resource)| (name.as_str(), resource.image())))?;
+        same_images(&at, faults.iter().map(|(name, resource)| (name.as_str(), resource.image())))?;
+        for (_, resource) in &mut next {
+            let wake =
+                resource.next_wake(&mut Hooks { io: &mut NoIo, inputs: &mut NoInputs, observer: &mut NoObserver });
+            resource.wait(wake);
+        }
+        Ok(next)
+    }
+
+    /// The declared name of a task of the scheduler, whatever its letters; none for the one of the instances without a task.
+    fn task(&self, task: TaskIndex) -> Option<String> {
+        let container = self.verified.container();
+        let is_declared = container.tasks.tasks[task.index()].task_type != TaskType::Freewheeling;
+        container.types.task_name(task.index()).filter(|_| is_declared).map(str::to_ascii_lowercase)
+    }
+
+    /// The same of the tree.
+    fn tree_task(&self, task: Option<usize>) -> Option<String> {
+        let config = self.source.config.as_ref()?;
+        Some(config.tasks[task?].name.to_ascii_lowercase())
+    }
+
+    /// Whether the scheduler ran the tasks of the tree's round, in its order and at its time.
+    fn same_cycles(
+        &self,
+        place: &str,
+        rounds: &Rounds<'_>,
+        seen: &[(TimeNs, Vec<TaskIndex>)],
+        tally: &mut Tally,
+    ) -> Result<(), Found> {
+        let wanted: Vec<_> = rounds.ran().iter().map(|task| self.tree_task(*task)).collect();
+        let [(time, ran)] = seen else { return Err(found("tasks", format!("{place}: {} rounds", seen.len()))) };
+        let got: Vec<_> = ran.iter().map(|task| self.task(*task)).collect();
+        if time.0 != rounds.now_ns() || got != wanted {
+            return Err(found("tasks", format!("{place}: {got:?} at {} ns instead of {wanted:?}", time.0)));
+        }
+        tally.cycles += got.len() as u64;
+        Ok(())
+    }
+}
+
+/// The tree's side of a round.
+#[derive(Clone, Copy)]
+struct RoundSide<'a> {
+    evaluator: &'a Evaluator<'a>,
+    rounds: &'a Rounds<'a>,
+    expected: &'a Result<(), Stop>,
+    places: &'a Places,
+}
+
+/// Which tasks ran when.
+#[derive(Default)]
+struct Cycles {
+    rounds: Vec<(TimeNs, Vec<TaskIndex>)>,
+}
+
+impl Observer for Cycles {
+    fn round_ended(&mut self, _image: &Image, time: TimeNs, ran: &[TaskIndex]) {
+        self.rounds.push((time, ran.to_vec()));
+    }
+}
+
+/// Whether all engines leave the same memory, to the byte.
+fn same_images<'a>(place: &str, images: impl Iterator<Item = (&'a str, &'a Image)>) -> Result<(), Found> {
+    let images: Vec<_> = images.collect();
+    let Some(((first, image), others)) = images.split_first() else { return Ok(()) };
+    for (other, others_image) in others {
+        if let Some(at) = image.first_difference(others_image) {
+            return Err(found("engines", format!("{place}: {first} and {other} differ at {at}")));
+        }
+    }
+    Ok(())
 }
 
 /// A difference behind a trap is one of its own.

@@ -7,6 +7,7 @@ use super::generate::Size;
 use super::tree::{Arg, Base, Class, Def, ExprKind, Kind, Op, Source, Step, Stmt, Ty, UnitKind};
 use super::visit::{Node, each};
 use crate::campaign::Figures;
+use khz_machine::library::{self, functions::TABLE};
 
 /// Counts of programs, by what they hold.
 #[derive(Debug, Clone, Default)]
@@ -218,13 +219,18 @@ impl Coverage {
             let call = calls.entry(name).or_default();
             *call = (call.0 + count, call.1 + 1);
         }
+        let functions: Vec<&str> = TABLE.iter().map(|row| row.name).filter(|name| !calls.contains_key(name)).collect();
+        let library_blocks: Vec<String> = library::blocks::all().map(|block| block.name).collect();
+        let blocks: Vec<&String> = library_blocks.iter().filter(|name| !self.blocks.contains_key(*name)).collect();
         let calls: Vec<String> = calls.iter().map(|(name, (count, types))| format!("{name} {count}/{types}")).collect();
         format!(
-            "sizes {:?}\nstandard functions {} (programs/types): {}\nstandard blocks {}: {:?}\nconversions {}, implicit ones {}, operators by type {}\nfeatures {:?}",
+            "sizes {:?}\nstandard functions {} of {}, not reached: {functions:?} (programs/types): {}\nstandard blocks {} of {}, not reached: {blocks:?}: {:?}\nconversions {}, implicit ones {}, operators by type {}\nfeatures {:?}",
             self.sizes,
             calls.len(),
+            TABLE.len(),
             calls.join(", "),
             self.blocks.len(),
+            library_blocks.len(),
             self.blocks,
             self.conversions.len(),
             self.widenings.len(),

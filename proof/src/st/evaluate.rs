@@ -157,6 +157,19 @@ impl<'s> Evaluator<'s> {
         }
     }
 
+    /// The value of an expression that reads nothing but constants, in a unit that is not running.
+    ///
+    /// # Errors
+    /// A trap in it.
+    pub(super) fn constant(&mut self, unit: usize, expr: &Expr) -> Result<Value, Stop> {
+        self.steps = 0;
+        self.memory.frames.push(self.source.instance(unit));
+        let me = Ref::frame(self.memory.frames.len() - 1);
+        let value = self.expr(&Context { unit, me, in_outs: BTreeMap::new() }, expr);
+        self.memory.frames.truncate(self.instances + 1);
+        value
+    }
+
     fn step(&mut self) -> Result<(), Stop> {
         self.steps += 1;
         if self.steps > self.limit { Err(Stop::TooLong) } else { Ok(()) }

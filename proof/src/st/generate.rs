@@ -57,7 +57,7 @@ pub(super) struct Generator {
     pub configured: bool,
 }
 
-/// The program of a seed.
+/// The program of a seed, which the compiler has to take: nothing in it traps by constants alone.
 #[must_use]
 pub fn generate(seed: u64) -> Source {
     let unit = Unit { name: String::new(), kind: UnitKind::Program, vars: Vec::new(), body: Vec::new(), gone: false };
@@ -88,6 +88,7 @@ pub fn generate(seed: u64) -> Source {
     } else {
         generator.make_unit(UnitKind::Program, "main".to_string());
     }
+    super::constants::settle(&mut generator.source);
     generator.source
 }
 

@@ -12,6 +12,7 @@ mod calls;
 pub mod case;
 pub mod compare;
 mod configure;
+pub mod constants;
 pub mod coverage;
 mod declare;
 pub mod evaluate;

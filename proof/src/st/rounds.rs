@@ -20,6 +20,7 @@ pub struct Rounds<'s> {
     source: &'s Source,
     states: Vec<State>,
     now_ns: u64,
+    ran: Vec<Option<usize>>,
 }
 
 impl<'s> Rounds<'s> {
@@ -27,7 +28,7 @@ impl<'s> Rounds<'s> {
     #[must_use]
     pub fn new(source: &'s Source) -> Self {
         let tasks = source.config.as_ref().map_or(0, |config| config.tasks.len());
-        Rounds { source, states: vec![State::default(); tasks], now_ns: 0 }
+        Rounds { source, states: vec![State::default(); tasks], now_ns: 0, ran: Vec::new() }
     }
 
     fn tasks(&self) -> &'s [Task] {
@@ -38,6 +39,12 @@ impl<'s> Rounds<'s> {
     #[must_use]
     pub fn now_ns(&self) -> u64 {
         self.now_ns
+    }
+
+    /// The tasks that the last round began, in their order; none stands for the instances without a task.
+    #[must_use]
+    pub fn ran(&self) -> &[Option<usize>] {
+        &self.ran
     }
 
     /// Runs a round: every task that is due, by priority, then declaration; last the instances without a task.
@@ -70,12 +77,17 @@ impl<'s> Rounds<'s> {
         }
         ready.sort_unstable();
         let now = self.now_ns as i64;
+        self.ran.clear();
         for (_, at) in ready {
+            self.ran.push(Some(at));
             self.run_instances(evaluator, Some(at), now)?;
             if let Some(interval) = config.tasks[at].interval_us {
                 let state = &mut self.states[at];
                 state.due_ns = at_or_after(state.due_ns, interval, self.now_ns + 1);
             }
+        }
+        if config.instances.iter().any(|instance| instance.task.is_none()) {
+            self.ran.push(None);
         }
         self.run_instances(evaluator, None, now)
     }

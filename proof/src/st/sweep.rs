@@ -170,7 +170,7 @@ pub(crate) fn drop_parameter(source: &mut Source, unit: usize, at: usize) {
         change(&mut caller.body, &mut |node| match node {
             Change::Function(callee, args) if callee == unit => args.retain(|arg| parameter(arg) != Some(at)),
             Change::Block(ty, args) if blocks.contains(&ty) => args.retain(|arg| parameter(arg) != Some(at)),
-            Change::Function(..) | Change::Block(..) | Change::Place(_) => {}
+            Change::Function(..) | Change::Block(..) | Change::Place(_) | Change::Expr(_) | Change::Store(..) => {}
         });
     }
 }

@@ -95,6 +95,10 @@ pub(crate) fn bodies_mut(stmt: &mut Stmt) -> Vec<&mut Vec<Stmt>> {
 
 /// What a changing walk comes by.
 pub(crate) enum Change<'t> {
+    /// An expression, after what is in it.
+    Expr(&'t mut Expr),
+    /// What is stored in a place of a type, after what is in it.
+    Store(Ty, &'t mut Expr),
     /// A place, after its indices.
     Place(&'t mut Place),
     /// The arguments of a call of a function, after what is in them.
@@ -110,6 +114,7 @@ pub(crate) fn change(list: &mut [Stmt], with: &mut dyn FnMut(Change<'_>)) {
             Stmt::Assign(place, value) => {
                 change_place(place, with);
                 change_expr(value, with);
+                with(Change::Store(place.ty, value));
             }
             Stmt::If(branches, _) => branches.iter_mut().for_each(|(condition, _)| change_expr(condition, with)),
             Stmt::Case(selector, ..) => change_expr(selector, with),
@@ -148,6 +153,7 @@ fn change_expr(expr: &mut Expr, with: &mut dyn FnMut(Change<'_>)) {
             with(Change::Function(*unit, args));
         }
     }
+    with(Change::Expr(expr));
 }
 
 fn change_args(args: &mut [Arg], with: &mut dyn FnMut(Change<'_>)) {
