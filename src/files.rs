@@ -46,13 +46,13 @@ pub enum FileError {
         /// What the system says.
         reason: std::io::Error,
     },
-    /// It is larger than [`MAX_FILE_BYTES`].
-    #[error("{path}: {bytes} bytes are more than the {MAX_FILE_BYTES} that a file may have")]
+    /// It is larger than a file of its sort may be.
+    #[error("{path}: the file is larger than the {limit} bytes that it may have")]
     TooLarge {
         /// The file.
         path: PathBuf,
-        /// Its size.
-        bytes: u64,
+        /// Most bytes.
+        limit: u64,
     },
     /// It is empty.
     #[error("{0}: the file is empty")]
@@ -128,21 +128,34 @@ pub fn list(paths: &[PathBuf]) -> Result<Vec<PathBuf>, FileError> {
 /// Reads one file whole.
 ///
 /// # Errors
-/// When it is missing, unreadable, empty or too large.
+/// When it is missing, unreadable, empty or larger than [`MAX_FILE_BYTES`].
 pub fn read_file(path: &Path) -> Result<Vec<u8>, FileError> {
+    read_limited(path, MAX_FILE_BYTES)
+}
+
+/// Reads one file of at most `limit` bytes whole; of a pipe or device no more than those are read.
+///
+/// # Errors
+/// When it is missing, unreadable, empty or too large.
+pub fn read_limited(path: &Path, limit: u64) -> Result<Vec<u8>, FileError> {
+    let too_large = || FileError::TooLarge { path: path.to_path_buf(), limit };
     let refused = |reason| FileError::Refused { path: path.to_path_buf(), reason };
     let file = File::open(path).map_err(refused)?;
     let metadata = file.metadata().map_err(refused)?;
     if metadata.is_file() && metadata.len() == 0 {
         return Err(FileError::Empty(path.to_path_buf()));
     }
-    if metadata.len() > MAX_FILE_BYTES {
-        return Err(FileError::TooLarge { path: path.to_path_buf(), bytes: metadata.len() });
+    if metadata.len() > limit {
+        return Err(too_large());
     }
     if !metadata.is_file() {
-        // A pipe or device can not be mapped and has no size: it is read up to the limit.
+        // A pipe or device can not be mapped and has no size: it is read up to the limit and one byte, which says that there is more.
         let mut bytes = Vec::new();
-        std::io::Read::read_to_end(&mut std::io::Read::take(file, MAX_FILE_BYTES), &mut bytes).map_err(refused)?;
+        let most = limit.saturating_add(1);
+        std::io::Read::read_to_end(&mut std::io::Read::take(file, most), &mut bytes).map_err(refused)?;
+        if bytes.len() as u64 > limit {
+            return Err(too_large());
+        }
         return if bytes.is_empty() { Err(FileError::Empty(path.to_path_buf())) } else { Ok(bytes) };
     }
     // SAFETY: the mapping is only read, copied out at once, and dropped before this function returns. Should another process cut

@@ -278,11 +278,37 @@ fn generated_programs_are_the_same_whatever_the_threads() {
     };
     let one = run(&["--threads", "1"]);
     assert_eq!(one, run(&["--threads", "3"]));
-    assert!(one.1.contains("equal: 41 programs, 10 scans each, from seed 12 on"), "{}", one.1);
+    assert!(
+        one.1.contains("equal: 41 programs, 10 scans each, from seed 12 on (40 compared, 1 refused by the compiler)"),
+        "{}",
+        one.1
+    );
     assert!(one.1.contains("containers: programs 20 "), "one of the pair is left out: {}", one.1);
     let told: serde_json::Value = serde_json::from_str(&run(&["--format", "json"]).0).unwrap();
     assert_eq!((&told["equal"], &told["programs"], &told["seed"]), (&true.into(), &41.into(), &12.into()));
     assert!(told["reached"].as_str().is_some_and(|text| text.contains("Structured Text: ")), "{told}");
     let output = khz().args(["diff", "--random", "3", "examples/bottling.st"]).output().unwrap();
     assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
+}
+
+#[test]
+fn options_that_would_count_for_nothing_are_refused() {
+    let last = u64::MAX.to_string();
+    let cases: [(&[&str], &str); 10] = [
+        (&["--random", "0"], "0 is not in 1.."),
+        (&["--random", "9", "--seed", &last], "beyond 64 bits"),
+        (&["--random", "2", "--scans", "5"], "--scans"),
+        (&["--random", "2", "--engine", "jit"], "--engine"),
+        (&["--random", "2", "--tolerance", "1"], "--tolerance"),
+        (&["--random", "2", "--watchdog-us", "5"], "--watchdog-us"),
+        (&["--random", "2", "--max-image", "5000"], "--max-image"),
+        (&["--threads", "2", "examples/bottling.st"], "--threads"),
+        (&["--inputs", "x.csv", "--tolerance", "1", "examples/bottling.st"], "--tolerance"),
+        (&["--engine", "jit", "examples/bottling.st"], "--against"),
+    ];
+    for (words, wanted) in cases {
+        let output = khz().arg("diff").args(words).output().unwrap();
+        assert_eq!(output.status.code(), Some(2), "{words:?}: {}", stderr(&output));
+        assert!(stderr(&output).contains(wanted), "{words:?}: {}", stderr(&output));
+    }
 }

@@ -154,7 +154,9 @@ fn tolerances_count_for_their_variables_and_for_the_rest_of_the_reals() {
     );
     assert_eq!(beyond(&["--tolerance", "main.since=T#20ms"]).1, 0, "two scans");
     assert!(beyond(&["--tolerance", "main.since=T#19ms"]).1 > 0);
-    for wrong in ["main.level=-1", "nan", "main.nothing=1", "main.level=1,x"] {
+    let wrong =
+        ["main.level=-1", "nan", "main.nothing=1", "main.level=1,x", "main.since=T#-5ms", "main.level=T#5ms", "T#5ms"];
+    for wrong in wrong.into_iter().chain(["main.name=1", "main.mode=1", "main.alarm=1"]) {
         let output = against(&other, &tank.trace, &["--tolerance", wrong]);
         assert_eq!(output.status.code(), Some(2), "{wrong}: {}", stderr(&output));
     }
@@ -237,6 +239,97 @@ fn a_constant_distance_of_the_times_is_given_or_found() {
     }
     let output = against(&tank.source, &tank.trace, &["--align", "soon"]);
     assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
+}
+
+#[test]
+fn what_compared_nothing_or_did_not_end_is_not_equal() {
+    let tank = Recorded::new("against-nothing");
+    let early = tank.changed("early.csv", |line, mut cells| {
+        if line > 1 {
+            cells[0] = (cells[0].parse::<i64>().unwrap() - 10_000_000).to_string();
+        }
+        Some(cells)
+    });
+    let empty = tank.scratch.write("empty.csv", "time_us,main.level,main.alarm\n0,,\n10000,,\n");
+    for trace in [&early, &empty] {
+        let page = tank.scratch.path("nothing.html");
+        let told = answer(&tank.source, trace, &["--report", page.to_str().unwrap()], 1);
+        assert_eq!((&told["equal"], &told["compared"]), (&false.into(), &0.into()));
+        assert_eq!(told["verdict"], "nothing was compared");
+        assert!(told["ended"].as_str().unwrap().contains("--align"), "{told}");
+        assert!(std::fs::read_to_string(page).unwrap().contains("<b>nothing was compared</b>"));
+    }
+    let text = stderr(&against(&tank.source, &early, &[]));
+    assert!(text.contains("--align") && !text.contains("equal"), "{text}");
+    let trapping = TANK.replace("count := count + 1;", "count := count + 1 + 0 / (100 - count);");
+    let trapping = tank.scratch.write("trap.st", trapping);
+    for (source, words) in [(&trapping, &[][..]), (&tank.source, &["--scans", "50"])] {
+        let text = stderr(&against(source, &tank.trace, words));
+        assert!(text.contains("not compared to the end") && !text.contains("equal within"), "{text}");
+    }
+    // One variable of which nothing is known does not pass for equal.
+    let partly = tank.scratch.write("partly.csv", "time_us,main.count,main.alarm\n0,1,\n10000,2,\n");
+    let text = stderr(&against(&tank.source, &partly, &[]));
+    assert!(text.contains("of 1 of 2 variables no value was compared"), "{text}");
+    assert!(text.contains("main.alarm: 0 values\n"), "{text}");
+}
+
+#[test]
+fn a_deviation_of_a_time_is_a_duration() {
+    let tank = Recorded::new("against-duration");
+    let other = tank.scratch.write("other.st", TANK.replace("T#50ms", "T#70ms"));
+    let text = stderr(&against(&other, &tank.trace, &["--tolerance", "main.since=T#5ms"]));
+    assert!(text.contains("differ (± T#5ms)") && text.contains("largest deviation T#20ms in line"), "{text}");
+    assert!(!text.contains("000000 in line"), "{text}");
+}
+
+#[test]
+fn columns_that_are_left_out_are_named() {
+    let tank = Recorded::new("against-left-out");
+    let trace = tank.scratch.write("t.csv", "time_us,N,extra,other\n0,1,x,y\n10000,2,x,y\n");
+    let map = tank.scratch.write("names.csv", "N,main.count\n");
+    let text = stderr(&against(&tank.source, &trace, &["--map", map.to_str().unwrap()]));
+    assert!(text.contains("left out: extra, other\n"), "{text}");
+}
+
+#[test]
+fn a_file_without_end_is_read_no_further_than_its_limit() {
+    let read = kilohertz::files::read_limited(Path::new("/dev/zero"), 1000);
+    assert!(matches!(read, Err(kilohertz::files::FileError::TooLarge { limit: 1000, .. })), "{read:?}");
+    let tank = Recorded::new("against-limit");
+    let bytes = std::fs::metadata(&tank.source).unwrap().len();
+    assert_eq!(kilohertz::files::read_limited(&tank.source, bytes).unwrap().len() as u64, bytes);
+    assert!(kilohertz::files::read_limited(&tank.source, bytes - 1).is_err());
+}
+
+/// More texts than a program's are kept for it: the trace's do not count.
+#[test]
+fn texts_of_a_long_trace_leave_room_for_the_programs() {
+    let scratch = Scratch::new("against-texts");
+    let source = scratch.write(
+        "p.st",
+        "PROGRAM main VAR s : STRING[8]; END_VAR s := 'other'; END_PROGRAM
+        CONFIGURATION c RESOURCE r ON PLC TASK t(INTERVAL := T#10ms, PRIORITY := 0); PROGRAM main WITH t : main; END_RESOURCE END_CONFIGURATION",
+    );
+    let mut rows = String::from("time_us,main.s\n");
+    for row in 0..100_001 {
+        rows += &format!("{row},'t{row}'\n");
+    }
+    let trace = scratch.write("t.csv", rows);
+    let told = answer(&source, &trace, &[], 5);
+    assert_eq!(variable(&told, "main.s")["first"]["program"], "'other'");
+}
+
+/// A mapping of as many lines as there may be is read at once: looking each up in a list would be five thousand million steps.
+#[test]
+fn a_long_mapping_is_found_by_name() {
+    let lines: String = (0..100_000).map(|line| format!("Column{line},v{line}\n")).collect();
+    let mapping = Mapping::read("map.csv", lines.as_bytes()).unwrap();
+    assert_eq!(
+        mapping.find("cOLUMN99999").map(|mapped| (mapped.variable.as_str(), mapped.line)),
+        Some(("v99999", 100_000))
+    );
+    assert!(mapping.find("Column100000").is_none());
 }
 
 /// The trace begins in the middle: no row lies on time 0, and nothing drives the program.
@@ -363,7 +456,8 @@ fn what_is_no_trace_is_refused_by_line_and_column() {
         assert!(matches!(output.status.code(), Some(1 | 2)), "{wanted}: {}", stderr(&output));
         assert!(stderr(&output).contains(wanted), "wanted {wanted}, got {}", stderr(&output));
     }
-    let maps: [(&str, &str); 5] = [
+    let maps: [(&str, &str); 6] = [
+        ("main.level,main.level\nmain.alram,main.alarm\n", "map.csv:2, column 1: the trace has no column `main.alram`"),
         ("A\n", ":1, column 2: the variable of `A` is missing"),
         (",main.level\n", ":1, column 1: the name of a column is missing"),
         ("A,main.level,much\n", ":1, column 3: `much` is not a number"),
@@ -410,7 +504,7 @@ fn damaged_traces_and_mappings_are_read_or_refused() {
         (khz_machine::variables::VariableTable::of(program.container()), program.image(1 << 20).unwrap());
     let good = "time_us,main.open,main.inflow,main.level,main.name,main.mode,main.since,main.big\n0,1,2.5,1.0,\"'a, b'\",full,T#5ms,18446744073709551615\n\
         10.5,FALSE,1e3,NaN,\"x\"\"y\",1,70,16#FF\n20,,,,,,,\n";
-    let map = "column,variable\nA,main.level,0.5,1\n# no\nB,\n";
+    let map = "column,variable\nmain.level,main.level,0.5,1\n# no\nmain.name,\n";
     let pieces: [&[u8]; 12] =
         [b"\"", b",", b"\n", b"\r", b"-", b"1e308", b"main.", b"\xFF", b"T#", b"'", b"99999999999999999999", b"\0"];
     Trace::read("trace.csv", good.as_bytes(), &Choice::default(), &names, &image).expect("the undamaged trace");
@@ -433,15 +527,20 @@ fn damaged_traces_and_mappings_are_read_or_refused() {
             }
             bytes
         };
-        let mapping = Mapping::read("map.csv", &damage(&mut random, map)).unwrap_or_default();
+        // One of the two, so that the other's damage is not all that is told.
+        let (trace, map) = match random.below(2) {
+            0 => (good.as_bytes().to_vec(), damage(&mut random, map)),
+            _ => (damage(&mut random, good), map.as_bytes().to_vec()),
+        };
+        let mapping = Mapping::read("map.csv", &map).unwrap_or_default();
         let choice = Choice { mapping, drive: None };
-        match Trace::read("trace.csv", &damage(&mut random, good), &choice, &names, &image) {
+        match Trace::read("trace.csv", &trace, &choice, &names, &image) {
             Ok(trace) => {
                 assert!(!trace.is_empty() && trace.times_us.is_sorted());
                 read += 1;
             }
             Err(error) => {
-                assert!(error.to_string().starts_with("trace.csv:"), "{error}");
+                assert!(["trace.csv:", "map.csv:"].iter().any(|file| error.to_string().starts_with(file)), "{error}");
                 refused += 1;
             }
         }

@@ -1,4 +1,4 @@
-//! A counting allocator proves that a scan allocates nothing: in either engine, and in the scheduler around them.
+//! A counting allocator proves that a scan allocates nothing, in either engine and in the scheduler around them, and that tables of inputs are kept small.
 
 mod common;
 
@@ -7,6 +7,7 @@ use std::cell::Cell;
 
 thread_local! {
     static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
+    static HELD_BYTES: Cell<i64> = const { Cell::new(0) };
 }
 
 /// Counts what each thread asks for, and hands everything on to the system.
@@ -17,12 +18,14 @@ struct Counting;
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         ALLOCATIONS.with(|count| count.set(count.get() + 1));
+        HELD_BYTES.with(|bytes| bytes.set(bytes.get() + layout.size() as i64));
         // SAFETY: the caller's promise is passed on.
         unsafe { System.alloc(layout) }
     }
 
     unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
         ALLOCATIONS.with(|count| count.set(count.get() + 1));
+        HELD_BYTES.with(|bytes| bytes.set(bytes.get() - layout.size() as i64));
         // SAFETY: the caller's promise is passed on.
         unsafe { System.dealloc(pointer, layout) }
     }
@@ -36,8 +39,11 @@ fn allocations() -> u64 {
 }
 
 use khz_frontend::{CompileOptions, SourceInput};
-use khz_scheduler::{Hooks, LoadOptions, NoInputs, NoIo, NoObserver, Resource, Running, VirtualClock};
+use khz_machine::variables::VariableTable;
+use khz_scheduler::{Hooks, InputSource, LoadOptions, NoInputs, NoIo, NoObserver, Resource, Running, VirtualClock};
+use kilohertz::inputs::CsvInputs;
 use kilohertz::pipeline::{self, EngineKind, Program};
+use kilohertz::traces::MAX_CELLS;
 
 fn program(path: &str) -> Program {
     let bytes = std::fs::read(common::root().join(path)).unwrap();
@@ -78,6 +84,37 @@ fn a_round_allocates_nothing() {
             drop(running);
         }
     }
+}
+
+/// 20 bytes a cell and 16 a row, and at most twice that in lists that grow; every further user of the table has two words of it.
+#[test]
+fn a_table_of_inputs_is_held_once_and_compactly() {
+    const ROWS: i64 = 50_000;
+    let source = "PROGRAM main VAR a : BOOL; b : REAL; s : STRING[8]; END_VAR END_PROGRAM";
+    let source = SourceInput { name: "main.st".into(), bytes: source.into() };
+    let program = pipeline::compile(&[source], &CompileOptions::default()).unwrap().programs.remove(0);
+    let (names, image) = (VariableTable::of(program.container()), program.image(1 << 20).unwrap());
+    let rows = (0..ROWS).map(|row| format!("{row},{},{row}.5,'{}'\n", row % 2, row % 7));
+    let text = format!("time_us,main.a,main.b,main.s\n{}", rows.collect::<String>());
+    let before = HELD_BYTES.with(Cell::get);
+    let inputs = CsvInputs::parse("rows.csv", text.as_bytes(), &names, &image).unwrap();
+    let sides = [(); 4].map(|()| inputs.clone());
+    let held = HELD_BYTES.with(Cell::get) - before;
+    assert!(held < 2 * ROWS * (16 + 3 * 20) + 10_000, "{held} bytes");
+    assert_eq!(sides[3].next_change_us(), Some(0));
+}
+
+#[test]
+fn more_cells_than_a_table_may_have_are_refused_where_they_begin() {
+    let source = SourceInput { name: "main.st".into(), bytes: "PROGRAM main VAR a : BOOL; END_VAR END_PROGRAM".into() };
+    let program = pipeline::compile(&[source], &CompileOptions::default()).unwrap().programs.remove(0);
+    let (names, image) = (VariableTable::of(program.container()), program.image(1 << 20).unwrap());
+    let width = 9000;
+    let row = format!("0{}\n", ",1".repeat(width));
+    let text = format!("time_us{}\n{}", ",main.a".repeat(width), row.repeat(MAX_CELLS / width + 1));
+    let refused = CsvInputs::parse("rows.csv", text.as_bytes(), &names, &image).unwrap_err();
+    assert_eq!((refused.line, refused.column), ((MAX_CELLS / width + 2) as u64, Some((MAX_CELLS % width + 2) as u64)));
+    assert!(refused.reason.contains("values that a table may have"), "{refused}");
 }
 
 #[test]

@@ -204,7 +204,7 @@ fn columns() -> &'static (VariableTable, Image) {
 /// An `--inputs` file: refused with a line, or every row can be applied in the order of time.
 pub fn csv(bytes: &[u8]) {
     let (names, image) = columns();
-    let mut inputs = match CsvInputs::parse(bytes, names, image) {
+    let mut inputs = match CsvInputs::parse("inputs.csv", bytes, names, image) {
         Ok(inputs) => inputs,
         Err(error) => {
             return assert!(error.line > 0 && !error.reason.is_empty(), "an error without a place: {error:?}");

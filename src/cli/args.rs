@@ -174,14 +174,14 @@ pub enum EngineArg {
     Interp,
 }
 
-/// Which engines are measured.
+/// Which engines are measured, tested or compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum EnginesArg {
     /// Native code.
     Jit,
     /// The interpreter.
     Interp,
-    /// One after the other.
+    /// Each of them.
     Both,
 }
 
@@ -206,8 +206,8 @@ pub struct ResourceArgs {
     /// Values over time: first column time_us, then a column for each variable or address
     #[arg(long, value_name = "CSV")]
     pub inputs: Option<PathBuf>,
-    /// Watchdog for tasks that set none, in microseconds; 0: none
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    /// Watchdog for tasks that set none, in microseconds (default 0: none; `diff`: 100000, which 0 stands for there)
+    #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true)]
     pub watchdog_us: u64,
     /// Largest memory image, in bytes
     #[arg(long, value_name = "BYTES", default_value_t = khz_bytecode::limits::MAX_IMAGE_BYTES)]
@@ -339,6 +339,21 @@ pub struct TestArgs {
     pub max_image: u64,
 }
 
+/// What says nothing about generated programs.
+const NOT_WITH_RANDOM: [&str; 11] = [
+    "files",
+    "dialect",
+    "against",
+    "inputs",
+    "random_inputs",
+    "random_variables",
+    "scans",
+    "resource",
+    "set",
+    "watchdog_us",
+    "max_image",
+];
+
 /// `khz diff`.
 #[derive(Debug, Args)]
 #[command(mut_arg("files", |files| files.required(false).required_unless_present("random")))]
@@ -346,8 +361,8 @@ pub struct DiffArgs {
     #[command(flatten)]
     #[allow(missing_docs, reason = "clap would show it as help of the group")]
     pub sources: Sources,
-    /// Rounds to compare (default 1000)
-    #[arg(long, value_name = "N")]
+    /// Rounds to compare (default 1000); along a trace how many it may take to its end (default 10000000)
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub scans: Option<u64>,
     /// Give the inputs new values each round: what is located at %I, or where nothing is, VAR_INPUT of the programs
     #[arg(long, conflicts_with = "inputs")]
@@ -359,7 +374,7 @@ pub struct DiffArgs {
     #[arg(long, conflicts_with_all = ["inputs", "against"])]
     pub random_variables: bool,
     /// Compare N generated programs instead: from --seed on, 10 scans each
-    #[arg(long, value_name = "N", conflicts_with_all = ["files", "against", "inputs", "random_inputs", "random_variables"])]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..), conflicts_with_all = NOT_WITH_RANDOM)]
     pub random: Option<u64>,
     /// Threads for --random; they do not change what is printed (default: one for each processor)
     #[arg(long, value_name = "N", requires = "random")]
@@ -389,9 +404,9 @@ pub struct DiffArgs {
     /// Both curves of every variable as one self-contained HTML page
     #[arg(long, value_name = "OUT.html", requires = "against")]
     pub report: Option<PathBuf>,
-    /// Which engines run along the trace
-    #[arg(long, value_enum, default_value = "both", requires = "against")]
-    pub engine: EnginesArg,
+    /// Which engines run along the trace, both in lock-step (default both)
+    #[arg(long, value_enum, requires = "against")]
+    pub engine: Option<EnginesArg>,
     #[command(flatten)]
     #[allow(missing_docs, reason = "clap would show it as help of the group")]
     pub resource: ResourceArgs,
@@ -404,6 +419,26 @@ impl DiffArgs {
     /// Whether the inputs are random.
     pub fn is_random(&self) -> bool {
         self.random_inputs || self.random_variables || self.seed.is_some()
+    }
+
+    /// An option that says nothing without another one: clap lets it pass when that other one conflicts with what is given.
+    pub fn check(&self) -> Result<(), String> {
+        let along = [
+            ("map", self.map.is_some()),
+            ("tolerance", !self.tolerance.is_empty()),
+            ("align", self.align.is_some()),
+            ("drive", self.drive.is_some()),
+            ("on-change", self.on_change),
+            ("report", self.report.is_some()),
+            ("engine", self.engine.is_some()),
+        ];
+        if self.threads.is_some() && self.random.is_none() {
+            return Err("--threads is for --random N".to_string());
+        }
+        match along.iter().find(|(_, given)| *given && self.against.is_none()) {
+            Some((option, _)) => Err(format!("--{option} is for --against TRACE.csv")),
+            None => Ok(()),
+        }
     }
 }
 

@@ -5,8 +5,8 @@ use std::path::Path;
 use khz_machine::image::Image;
 use khz_machine::variables::VariableTable;
 use kilohertz::files;
-use kilohertz::inputs::CsvError;
 pub use kilohertz::inputs::CsvInputs;
+use kilohertz::traces::MAX_TABLE_BYTES;
 
 use super::output::Failure;
 
@@ -26,7 +26,6 @@ pub fn set_values(names: &VariableTable, image: &mut Image, settings: &[String])
 
 /// Reads and checks a whole `--inputs` file.
 pub fn read_csv(path: &Path, names: &VariableTable, image: &Image) -> Result<CsvInputs, Failure> {
-    let bytes = files::read_file(path)?;
-    CsvInputs::parse(&bytes, names, image)
-        .map_err(|CsvError { line, reason }| Failure::refused(format!("{}:{line}: {reason}", path.display())))
+    let bytes = files::read_limited(path, MAX_TABLE_BYTES)?;
+    CsvInputs::parse(&path.display().to_string(), &bytes, names, image).map_err(Failure::refused)
 }

@@ -54,11 +54,12 @@ pub fn find(lockstep: &mut Lockstep<'_>, trace: &Arc<Trace>, names: &Arc<Variabl
     let mut ranked: Vec<(i64, u64)> = votes.into_iter().collect();
     ranked.sort_by_key(|(offset, votes)| (std::cmp::Reverse(*votes), (offset - guess_us).abs(), *offset));
     candidates.extend(ranked.into_iter().map(|(offset, _)| offset));
+    let spans: Vec<f64> = (0..trace.columns.len()).map(|column| span(trace, column)).collect();
     let mut seen = std::collections::BTreeSet::new();
     candidates.retain(|offset| seen.insert(*offset));
     candidates.truncate(MAX_TRIES);
     let tried = candidates.iter().map(|offset| {
-        let (beyond, compared, sum) = attempt(lockstep, trace, names, drive.as_ref(), terms, *offset);
+        let (beyond, compared, sum) = attempt(lockstep, trace, names, drive.as_ref(), terms, &spans, *offset);
         (beyond, sum, (offset - guess_us).abs(), *offset, compared)
     });
     let best = tried.min_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then((a.2, a.3).cmp(&(b.2, b.3))));
@@ -73,13 +74,14 @@ fn restart(lockstep: &mut Lockstep<'_>, drive: Option<&Drive>, offset_us: i64) {
     }
 }
 
-/// One try: values beyond the tolerance or not compared, all values, the sum of what they are beyond it (in tolerances).
+/// One try: values beyond the tolerance or not compared, all values, the sum of each column's largest deviation by its [`scale`].
 fn attempt(
     lockstep: &mut Lockstep<'_>,
     trace: &Arc<Trace>,
     names: &Arc<VariableTable>,
     drive: Option<&Drive>,
     terms: &Terms,
+    spans: &[f64],
     offset_us: i64,
 ) -> (u64, u64, f64) {
     restart(lockstep, drive, offset_us);
@@ -94,8 +96,28 @@ fn attempt(
     let reached = trace.len().min(MAX_ROWS) as u64;
     let wanted = reached * columns.len() as u64;
     let missing = if rows == 0 { wanted } else { early * columns.len() as u64 };
-    let largest = columns.iter().filter_map(|column| column.largest.as_ref()).map(|apart| apart.deviation);
-    (beyond + missing, rows, largest.filter(|deviation| deviation.is_finite()).sum())
+    let largest = columns.iter().filter_map(|column| {
+        let apart = column.largest.as_ref().filter(|apart| apart.deviation.is_finite())?;
+        let limit = column.tolerance.limit(apart.values[0].number().unwrap_or(0.0));
+        Some(apart.deviation / scale(limit, spans[column.column]))
+    });
+    (beyond + missing, rows, largest.sum())
+}
+
+/// What a deviation is measured by, so that nanoseconds do not outweigh a REAL: the tolerance where there is one, or how far the trace's values reach.
+fn scale(limit: f64, span: f64) -> f64 {
+    match (limit > 0.0, span > 0.0 && span.is_finite()) {
+        (true, _) => limit,
+        (false, true) => span,
+        (false, false) => 1.0,
+    }
+}
+
+/// How far the values of a column reach, over the rows that are tried.
+fn span(trace: &Trace, column: usize) -> f64 {
+    let numbers = (0..trace.len().min(MAX_ROWS)).filter_map(|row| trace.cell(row, column).number());
+    let ends = numbers.filter(|number| number.is_finite()).map(|number| (number, number));
+    ends.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1))).map_or(0.0, |(least, greatest)| greatest - least)
 }
 
 /// Distances between changes of the program and changes of the trace, each with how many pairs have it.
@@ -162,4 +184,17 @@ fn changes_of_program(
         }
     }
     changes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::scale;
+
+    #[test]
+    fn a_deviation_counts_by_its_tolerance_or_by_what_the_trace_spans() {
+        // 1 ms of a time that runs over 1 s is less than half the span of a REAL.
+        let (time, real) = (1e6 / scale(0.0, 1e9), 0.5 / scale(0.0, 1.0));
+        assert!(time < real);
+        assert!((scale(2e6, 1e9) - 2e6).abs() < 1e-9 && (scale(0.0, 0.0) - 1.0).abs() < 1e-9);
+    }
 }

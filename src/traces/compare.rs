@@ -139,6 +139,12 @@ impl Comparer {
         self.columns.iter().filter(|column| column.beyond > 0).count()
     }
 
+    /// Values that were compared.
+    #[must_use]
+    pub fn values(&self) -> u64 {
+        self.columns.iter().map(|column| column.rows).sum()
+    }
+
     fn row_time_us(&self, row: usize) -> i64 {
         self.trace.times_us[row].saturating_add(self.terms.offset_us)
     }

@@ -2,13 +2,12 @@
 
 use std::sync::Arc;
 
-use khz_bytecode::container::ElementaryType;
 use khz_machine::image::Image;
-use khz_machine::variables::{Domain, VariableTable};
+use khz_machine::variables::VariableTable;
 use khz_scheduler::InputSource;
 
 use super::read::{Column, Trace};
-use super::sample::Sample;
+use super::sample;
 
 /// Gives the driving columns of a trace to a program, each row from its time on.
 #[derive(Debug, Clone)]
@@ -62,26 +61,10 @@ impl InputSource for Drive {
             let row = self.rows[self.next];
             for column in &self.columns {
                 let Column { variable, domain, .. } = &self.trace.columns[*column];
-                // Every value was checked when the trace was read.
-                let _ = match self.trace.cell(row, *column) {
-                    Sample::Nothing => true,
-                    Sample::Whole(value) => self.names.write_bits(image, variable, value as u64),
-                    Sample::Wide(value) => self.names.write_bits(image, variable, value),
-                    Sample::Real(value) => self.names.write_bits(image, variable, real_bits(domain, value)),
-                    Sample::Text(text) => self.names.write(image, variable, self.trace.texts.get(text)).is_ok(),
-                };
+                let value = self.trace.cell(row, *column);
+                sample::write(&self.names, &self.trace.texts, image, (variable, domain), value);
             }
             self.next += 1;
         }
-    }
-}
-
-/// Bits of a REAL or LREAL, with the one NaN.
-fn real_bits(domain: &Domain, value: f64) -> u64 {
-    match (domain, value.is_nan()) {
-        (Domain::Elementary(ElementaryType::Real), true) => 0xFFC0_0000,
-        (Domain::Elementary(ElementaryType::Real), false) => u64::from((value as f32).to_bits()),
-        (_, true) => 0xFFF8_0000_0000_0000,
-        (_, false) => value.to_bits(),
     }
 }

@@ -1,6 +1,9 @@
 //! Names of columns and the variables that they are: the `--map` file.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use super::TraceError;
+use super::table::csv_error;
 
 /// Lines of a mapping, at most.
 const MAX_LINES: usize = 100_000;
@@ -8,6 +11,8 @@ const MAX_LINES: usize = 100_000;
 /// What a column is.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mapped {
+    /// Line of the mapping, from 1.
+    pub line: u64,
     /// Name of the column in the trace.
     pub column: String,
     /// Our variable; empty: the column is left out.
@@ -19,7 +24,10 @@ pub struct Mapped {
 /// Every line of a mapping.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Mapping {
+    file: String,
     lines: Vec<Mapped>,
+    /// Positions in `lines` by the column's name in lower case: no two lines are of the same name in any case.
+    positions: BTreeMap<String, usize>,
 }
 
 impl Mapping {
@@ -30,9 +38,9 @@ impl Mapping {
     pub fn read(file: &str, bytes: &[u8]) -> Result<Mapping, TraceError> {
         let mut reader = csv::ReaderBuilder::new();
         reader.trim(csv::Trim::All).has_headers(false).flexible(true).comment(Some(b'#'));
-        let mut mapping = Mapping::default();
+        let mut mapping = Mapping { file: file.to_string(), ..Mapping::default() };
         for (number, record) in reader.from_reader(bytes).records().enumerate() {
-            let record = record.map_err(|error| TraceError::csv(file, &error))?;
+            let record = record.map_err(|error| csv_error(file, &error))?;
             let line = record.position().map_or(0, csv::Position::line);
             let wrong = |column, reason: String| TraceError::at(file, line, column, reason);
             let cell = |at: usize| record.get(at).filter(|cell| !cell.is_empty());
@@ -65,16 +73,30 @@ impl Mapping {
                 return Err(wrong(1, format!("more than {MAX_LINES} lines")));
             }
             let scale = (cell(2).is_some() || cell(3).is_some()).then_some((factor, offset));
-            mapping.lines.push(Mapped { column, variable: cell(1).unwrap_or_default().to_string(), scale });
+            mapping.positions.insert(column.to_ascii_lowercase(), mapping.lines.len());
+            mapping.lines.push(Mapped { line, column, variable: cell(1).unwrap_or_default().to_string(), scale });
         }
         Ok(mapping)
     }
 
-    /// What a column is, if it says so: by its name as it stands, or else in any case.
+    /// What a column is, if it says so; names count in any case.
     #[must_use]
     pub fn find(&self, column: &str) -> Option<&Mapped> {
-        let exact = self.lines.iter().find(|mapped| mapped.column == column);
-        exact.or_else(|| self.lines.iter().find(|mapped| mapped.column.eq_ignore_ascii_case(column)))
+        self.positions.get(&column.to_ascii_lowercase()).and_then(|position| self.lines.get(*position))
+    }
+
+    /// Every line must be of a column that the trace has: a misspelt one would leave the column out without a word.
+    ///
+    /// # Errors
+    /// The first line whose column is none of `columns`.
+    pub(super) fn check_columns<'c>(&self, columns: impl Iterator<Item = &'c str>) -> Result<(), TraceError> {
+        let there: BTreeSet<String> = columns.map(str::to_ascii_lowercase).collect();
+        match self.lines.iter().find(|mapped| !there.contains(&mapped.column.to_ascii_lowercase())) {
+            Some(Mapped { line, column, .. }) => {
+                Err(TraceError::at(&self.file, *line, 1, format!("the trace has no column `{column}`")))
+            }
+            None => Ok(()),
+        }
     }
 
     /// Whether there is none.

@@ -14,8 +14,10 @@ mod drive;
 mod mapping;
 mod read;
 pub mod sample;
+pub mod table;
 pub mod tolerance;
 
 pub use drive::Drive;
 pub use mapping::{Mapped, Mapping};
-pub use read::{Choice, Column, MAX_CELLS, MAX_TRACE_BYTES, Trace, TraceError};
+pub use read::{Choice, Column, Trace, TraceError};
+pub use table::{MAX_CELLS, MAX_TABLE_BYTES};

@@ -7,13 +7,7 @@ use khz_machine::variables::{Domain, Variable, VariableTable};
 
 use super::mapping::{Mapped, Mapping};
 use super::sample::{Reader, Sample, Texts};
-
-/// Largest trace file, in bytes.
-pub const MAX_TRACE_BYTES: u64 = 256 << 20;
-/// Most values of a trace: 16 bytes each.
-pub const MAX_CELLS: usize = 8 << 20;
-/// Most columns.
-const MAX_COLUMNS: usize = 10_000;
+use super::table::{MAX_CELLS, csv_error, open};
 
 /// What is wrong with a trace or a mapping, and where.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -31,20 +25,8 @@ pub struct TraceError {
 
 impl TraceError {
     /// At a line and column.
-    pub(super) fn at(file: &str, line: u64, column: u64, reason: impl Into<String>) -> TraceError {
+    pub(crate) fn at(file: &str, line: u64, column: u64, reason: impl Into<String>) -> TraceError {
         TraceError { file: file.to_string(), line, column: Some(column), reason: reason.into() }
-    }
-
-    pub(super) fn csv(file: &str, error: &csv::Error) -> TraceError {
-        let reason = match error.kind() {
-            csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {
-                format!("{len} cells, but the header has {expected_len}")
-            }
-            csv::ErrorKind::Utf8 { .. } => "the text is not UTF-8".to_string(),
-            other => format!("{other:?}"),
-        };
-        let line = error.position().map_or(1, csv::Position::line);
-        TraceError { file: file.to_string(), line, column: None, reason }
     }
 }
 
@@ -70,6 +52,14 @@ pub struct Column {
     pub drives: bool,
     /// Position among the cells of a row.
     cell: usize,
+}
+
+impl Column {
+    /// Whether a name means it: that of the trace, or the variable's.
+    #[must_use]
+    pub fn is_named(&self, name: &str) -> bool {
+        self.name.eq_ignore_ascii_case(name) || self.variable.name.eq_ignore_ascii_case(name)
+    }
 }
 
 /// A whole trace.
@@ -101,16 +91,11 @@ impl Trace {
         names: &VariableTable,
         image: &Image,
     ) -> Result<Trace, TraceError> {
-        if bytes.len() as u64 > MAX_TRACE_BYTES {
-            let reason = format!("{} bytes are more than the {MAX_TRACE_BYTES} that a trace may have", bytes.len());
-            return Err(TraceError { file: file.to_string(), line: 1, column: None, reason });
-        }
-        let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(bytes);
-        let header = reader.headers().map_err(|error| TraceError::csv(file, &error))?.clone();
+        let (mut reader, header) = open(file, bytes)?;
         let (mut trace, readers) = Trace::header(file, &header, choice, names)?;
         let mut scratch = image.clone();
         let mut record = csv::StringRecord::new();
-        while reader.read_record(&mut record).map_err(|error| TraceError::csv(file, &error))? {
+        while reader.read_record(&mut record).map_err(|error| csv_error(file, &error))? {
             let line = record.position().map_or(0, csv::Position::line);
             let time = record.get(0).unwrap_or_default();
             let time_us = parse_time_us(time)
@@ -142,12 +127,7 @@ impl Trace {
         choice: &Choice,
         names: &VariableTable,
     ) -> Result<(Trace, Vec<Reader>), TraceError> {
-        if header.get(0).is_none_or(|name| !name.eq_ignore_ascii_case("time_us")) {
-            return Err(TraceError::at(file, 1, 1, "the first column must be time_us"));
-        }
-        if header.len() > MAX_COLUMNS {
-            return Err(TraceError::at(file, 1, MAX_COLUMNS as u64, format!("more than {MAX_COLUMNS} columns")));
-        }
+        choice.mapping.check_columns(header.iter().skip(1))?;
         let mut trace = Trace {
             times_us: Vec::new(),
             lines: Vec::new(),

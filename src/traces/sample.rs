@@ -1,10 +1,12 @@
 //! One value of a trace or of the program, in a form that both have.
 
+use std::sync::Arc;
+
 use khz_bytecode::container::ElementaryType;
 use khz_bytecode::value::Storage;
 use khz_machine::image::Image;
-use khz_machine::semantics::Value;
-use khz_machine::variables::{Domain, Variable, VariableTable, VariableValue};
+use khz_machine::semantics::{Value, canonical_f32, canonical_f64};
+use khz_machine::variables::{Domain, Variable, VariableError, VariableTable, VariableValue, integer_range};
 
 /// A value.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -60,14 +62,16 @@ impl Sample {
     }
 }
 
-/// From this number on, texts of the program are not kept.
+/// Texts of the program, beside those of the trace: further ones are not kept.
 const MAX_TEXTS: usize = 100_000;
 
 /// Texts, each once.
 #[derive(Debug, Clone, Default)]
 pub struct Texts {
-    list: Vec<String>,
-    positions: std::collections::BTreeMap<String, u32>,
+    list: Vec<Arc<str>>,
+    positions: std::collections::BTreeMap<Arc<str>, u32>,
+    /// How many of them [`Texts::add_limited`] added.
+    limited: usize,
 }
 
 impl Texts {
@@ -77,8 +81,9 @@ impl Texts {
             return found;
         }
         let position = u32::try_from(self.list.len()).unwrap_or(u32::MAX);
-        self.list.push(text.to_string());
-        self.positions.insert(text.to_string(), position);
+        let text: Arc<str> = text.into();
+        self.list.push(text.clone());
+        self.positions.insert(text, position);
         Sample::Text(position)
     }
 
@@ -91,15 +96,18 @@ impl Texts {
     fn add_limited(&mut self, text: &str) -> Sample {
         match self.find(text) {
             Some(found) => found,
-            None if self.list.len() >= MAX_TEXTS => Sample::Text(u32::MAX),
-            None => self.add(text),
+            None if self.limited >= MAX_TEXTS => Sample::Text(u32::MAX),
+            None => {
+                self.limited += 1;
+                self.add(text)
+            }
         }
     }
 
     /// A text.
     #[must_use]
     pub fn get(&self, position: u32) -> &str {
-        self.list.get(position as usize).map_or("", String::as_str)
+        self.list.get(position as usize).map_or("", AsRef::as_ref)
     }
 }
 
@@ -116,6 +124,49 @@ pub fn sample(names: &VariableTable, texts: &mut Texts, image: &Image, variable:
         }
         Err(_) => Sample::Nothing,
     }
+}
+
+/// Writes an IEC literal to `scratch`, and gives it as a value.
+///
+/// # Errors
+/// Those of [`VariableTable::write`].
+pub fn literal(
+    names: &VariableTable,
+    texts: &mut Texts,
+    scratch: &mut Image,
+    (variable, domain): (&Variable, &Domain),
+    literal: &str,
+) -> Result<Sample, VariableError> {
+    names.write(scratch, variable, literal)?;
+    Ok(match is_text(domain) {
+        true => texts.add(&names.text(scratch, variable)),
+        false => sample(names, texts, scratch, variable),
+    })
+}
+
+/// Gives a variable a value that was checked when it was read: no literal is read again but that of a text.
+pub fn write(
+    names: &VariableTable,
+    texts: &Texts,
+    image: &mut Image,
+    (variable, domain): (&Variable, &Domain),
+    value: Sample,
+) {
+    let bits = match (value, domain) {
+        (Sample::Nothing, _) => return,
+        (Sample::Text(text), _) => {
+            // The literal was written to a copy of this image before.
+            let _ = names.write(image, variable, texts.get(text));
+            return;
+        }
+        (Sample::Whole(value), _) => value as u64,
+        (Sample::Wide(value), _) => value,
+        (Sample::Real(value), Domain::Elementary(ElementaryType::Real)) => {
+            u64::from(canonical_f32(value as f32).to_bits())
+        }
+        (Sample::Real(value), _) => canonical_f64(value).to_bits(),
+    };
+    names.write_bits(image, variable, bits);
 }
 
 /// How a cell of a variable is read.
@@ -157,23 +208,10 @@ impl Reader {
             names.write_units(scratch, &self.variable, &units);
             return Ok(texts.add(&names.text(scratch, &self.variable)));
         }
-        match names.write(scratch, &self.variable, cell) {
-            Ok(()) => {
-                if self.is_text() {
-                    return Ok(texts.add(&names.text(scratch, &self.variable)));
-                }
-                Ok(sample(names, texts, scratch, &self.variable))
-            }
-            Err(error) => match plain(cell).filter(|_| !self.strict && !self.is_text()) {
-                Some(number) => Ok(Sample::Real(number)),
-                None => Err(error.to_string()),
-            },
-        }
-    }
-
-    fn is_text(&self) -> bool {
-        use ElementaryType as E;
-        matches!(self.domain, Domain::Text { .. } | Domain::Values { .. } | Domain::Elementary(E::Char | E::Wchar))
+        literal(names, texts, scratch, (&self.variable, &self.domain), cell).or_else(|error| {
+            let number = plain(cell).filter(|_| !self.strict && !is_text(&self.domain));
+            number.map(Sample::Real).ok_or_else(|| error.to_string())
+        })
     }
 
     /// Plain decimal numbers of types that hold them all; the rest goes the long way.
@@ -223,20 +261,13 @@ impl Sample {
     }
 }
 
-/// Least and greatest value of an integer type or a part of one.
+/// Least and greatest value of an integer type or a part of one; times and dates are 64 bits of nanoseconds.
 fn range(base: ElementaryType, domain: &Domain) -> (i128, i128) {
-    use ElementaryType as E;
-    let is_unsigned = matches!(
-        base,
-        E::Usint | E::Uint | E::Udint | E::Ulint | E::Byte | E::Word | E::Dword | E::Lword | E::Char | E::Wchar
-    );
+    let whole = integer_range(base).unwrap_or((i128::from(i64::MIN), i128::from(i64::MAX)));
     match domain {
-        Domain::Subrange { lower, upper, .. } if is_unsigned => (i128::from(*lower as u64), i128::from(*upper as u64)),
+        Domain::Subrange { lower, upper, .. } if whole.0 == 0 => (i128::from(*lower as u64), i128::from(*upper as u64)),
         Domain::Subrange { lower, upper, .. } => (i128::from(*lower), i128::from(*upper)),
-        _ => {
-            let bits = base.storage().bytes() * 8;
-            if is_unsigned { (0, (1 << bits) - 1) } else { (-(1 << (bits - 1)), (1 << (bits - 1)) - 1) }
-        }
+        _ => whole,
     }
 }
 
@@ -269,6 +300,36 @@ pub fn text(sample: Sample, texts: &Texts, domain: &Domain) -> String {
         (Sample::Text(u32::MAX), _) => "another text".to_string(),
         (Sample::Text(position), _) => texts.get(position).to_string(),
     }
+}
+
+/// A deviation or tolerance in words: that of a time or date is a duration.
+#[must_use]
+pub fn deviation_text(deviation: f64, domain: &Domain) -> String {
+    if !is_time(domain) {
+        return format!("{deviation}");
+    }
+    let mut out = String::new();
+    // Beyond 292 years the greatest duration is named.
+    VariableValue::from_loaded(ElementaryType::Time, Value::I64(deviation.round() as i64)).write_text(&mut out);
+    out
+}
+
+/// Whether values are numbers or times, for which a tolerance can count.
+#[must_use]
+pub fn is_number(domain: &Domain) -> bool {
+    !is_text(domain) && !matches!(domain, Domain::Elementary(ElementaryType::Bool))
+}
+
+/// Whether values are times or dates.
+#[must_use]
+pub fn is_time(domain: &Domain) -> bool {
+    matches!(domain, Domain::Elementary(ty) if is_moment(*ty))
+}
+
+/// Whether values are texts or names.
+fn is_text(domain: &Domain) -> bool {
+    use ElementaryType as E;
+    matches!(domain, Domain::Text { .. } | Domain::Values { .. } | Domain::Elementary(E::Char | E::Wchar))
 }
 
 /// A time or a date.

@@ -10,8 +10,9 @@ use crate::semantics::parse::{parse_integer, parse_real, parse_time};
 /// Why a text is no value of a type, in words that follow "`x` is INT: ".
 pub(super) type Reason = String;
 
-/// Least and greatest value of an integer or bit string type.
-fn integer_range(ty: ElementaryType) -> Option<(i128, i128)> {
+/// Least and greatest value of an integer or bit string type; `None` for other types.
+#[must_use]
+pub fn integer_range(ty: ElementaryType) -> Option<(i128, i128)> {
     use ElementaryType as E;
     let bits = ty.storage().bytes() * 8;
     match ty {

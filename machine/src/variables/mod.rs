@@ -22,6 +22,7 @@ use khz_bytecode::limits::SLOT_BYTES;
 use khz_bytecode::value::BytePlace;
 
 pub use address::DirectAddress;
+pub use literal::integer_range;
 pub use raw::Domain;
 pub use scalar::VariableValue;
 

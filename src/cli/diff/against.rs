@@ -13,8 +13,9 @@ use kilohertz::lockstep::EngineUnderTest;
 use kilohertz::pipeline::EngineKind;
 use kilohertz::traces::align::{self, Found};
 use kilohertz::traces::compare::{self, Apart, Compared, Comparer, End, Terms};
+use kilohertz::traces::sample::deviation_text;
 use kilohertz::traces::tolerance::Tolerances;
-use kilohertz::traces::{Choice, Drive, MAX_TRACE_BYTES, Mapping, Trace};
+use kilohertz::traces::{Choice, Drive, MAX_TABLE_BYTES, Mapping, Trace};
 use serde_json::{Value, json};
 
 use super::super::args::{DiffArgs, EnginesArg, Format};
@@ -26,6 +27,12 @@ use super::engines::{open, refused, report_difference};
 
 /// Rounds that the program may run along a trace without `--scans`.
 const DEFAULT_ROUNDS: u64 = 10_000_000;
+
+/// Says that nothing was compared.
+const NOTHING_COMPARED: &str = "no value was compared: every row lies before the program's start, or is empty (--align auto or US: the trace begins at another time)";
+
+/// Names of columns that are listed.
+const MOST_NAMES: usize = 8;
 
 /// What came of a comparison.
 pub struct Outcomes<'o> {
@@ -39,7 +46,7 @@ pub struct Outcomes<'o> {
     pub offset_us: i64,
     /// How that was found, if it was.
     pub found: Option<Found>,
-    /// How the program's run ended, if not with the trace.
+    /// Why the comparison says nothing about the whole trace, if so.
     pub ended: Option<String>,
 }
 
@@ -53,7 +60,7 @@ pub fn run(args: &DiffArgs, path: &Path) -> Outcome {
     let names = Arc::new(session.names.clone());
     let tolerances =
         Tolerances::parse(&args.tolerance).map_err(|reason| Failure::usage(format!("--tolerance: {reason}")))?;
-    check_names(&tolerances, &trace)?;
+    tolerances.check(&trace.columns).map_err(|reason| Failure::usage(format!("--tolerance: {reason}")))?;
     let mut terms = Terms { tolerances, offset_us: 0, on_change: args.on_change, curves: args.report.is_some() };
     let found = align(args, &session, &trace, &names, &mut terms)?;
     let offset_us = terms.offset_us;
@@ -70,6 +77,7 @@ pub fn run(args: &DiffArgs, path: &Path) -> Outcome {
         Err(found) => return Ok(report_difference(args.common.format, &found, &sources)),
     };
     let ended = match end {
+        End::Over if comparer.values() == 0 => Some(NOTHING_COMPARED.to_string()),
         End::Over => None,
         End::Trapped(fault) => {
             let report = TrapReport::new(&fault.trap, fault.place.entry(), session.program.container());
@@ -87,6 +95,7 @@ pub fn run(args: &DiffArgs, path: &Path) -> Outcome {
     print(args.common.format, &outcomes);
     Ok(match end {
         _ if comparer.differing() > 0 => Status::Differ,
+        End::Over if comparer.values() == 0 => Status::Refused,
         End::Over => Status::Done,
         End::Trapped(_) => Status::Trap,
         End::TooLong => Status::Refused,
@@ -95,7 +104,8 @@ pub fn run(args: &DiffArgs, path: &Path) -> Outcome {
 
 fn read_trace(args: &DiffArgs, session: &Session<'_>, path: &Path) -> Result<Trace, Failure> {
     let mapping = match &args.map {
-        Some(map) => Mapping::read(&map.display().to_string(), &read_limited(map)?).map_err(Failure::refused)?,
+        Some(map) => Mapping::read(&map.display().to_string(), &files::read_limited(map, MAX_TABLE_BYTES)?)
+            .map_err(Failure::refused)?,
         None => Mapping::default(),
     };
     let drive = match args.drive.as_deref().map(str::trim) {
@@ -106,11 +116,10 @@ fn read_trace(args: &DiffArgs, session: &Session<'_>, path: &Path) -> Result<Tra
     let wanted = drive.clone().unwrap_or_default();
     let image = session.program.image(session.args.max_image).map_err(Failure::refused)?;
     let choice = Choice { mapping, drive };
-    let trace = Trace::read(&path.display().to_string(), &read_limited(path)?, &choice, &session.names, &image);
+    let bytes = files::read_limited(path, MAX_TABLE_BYTES)?;
+    let trace = Trace::read(&path.display().to_string(), &bytes, &choice, &session.names, &image);
     let trace = trace.map_err(Failure::refused)?;
-    let is_there = |name: &&String| {
-        trace.columns.iter().any(|c| c.name.eq_ignore_ascii_case(name) || c.variable.name.eq_ignore_ascii_case(name))
-    };
+    let is_there = |name: &&String| trace.columns.iter().any(|column| column.is_named(name));
     if let Some(missing) = wanted.iter().find(|name| !is_there(name)) {
         return Err(Failure::usage(format!("--drive: no column of the trace is `{missing}`")));
     }
@@ -118,16 +127,6 @@ fn read_trace(args: &DiffArgs, session: &Session<'_>, path: &Path) -> Result<Tra
         return Err(Failure::usage("every column drives the program: there is nothing to compare"));
     }
     Ok(trace)
-}
-
-/// A file no larger than a trace may be.
-fn read_limited(path: &Path) -> Result<Vec<u8>, Failure> {
-    let bytes = std::fs::metadata(path).map_or(0, |metadata| metadata.len());
-    if bytes > MAX_TRACE_BYTES {
-        let reason = format!("{bytes} bytes are more than the {MAX_TRACE_BYTES} that a trace may have");
-        return Err(Failure::refused(format!("{}: {reason}", path.display())));
-    }
-    Ok(files::read_file(path)?)
 }
 
 /// Names between commas; those between brackets are indices.
@@ -149,17 +148,6 @@ fn split_names(text: &str) -> Vec<String> {
         }
     }
     names.iter().map(|name| name.trim().to_string()).filter(|name| !name.is_empty()).collect()
-}
-
-/// A tolerance for a name that is none is a mistake.
-fn check_names(tolerances: &Tolerances, trace: &Trace) -> Result<(), Failure> {
-    let is_there = |name: &str| {
-        trace.columns.iter().any(|c| c.name.eq_ignore_ascii_case(name) || c.variable.name.eq_ignore_ascii_case(name))
-    };
-    match tolerances.names().find(|name| !is_there(name)) {
-        Some(name) => Err(Failure::usage(format!("--tolerance: no column of the trace is `{name}`"))),
-        None => Ok(()),
-    }
 }
 
 /// Sets the offset that is given, or looks for one.
@@ -187,7 +175,7 @@ fn align(
 
 fn engines(args: &DiffArgs, session: &Session<'_>) -> Result<Vec<EngineUnderTest>, Failure> {
     let all = EngineUnderTest::standard(&session.program, args.resource.max_image).map_err(refused)?;
-    let is_wanted = |side: &EngineUnderTest| match args.engine {
+    let is_wanted = |side: &EngineUnderTest| match args.engine.unwrap_or(EnginesArg::Both) {
         EnginesArg::Both => true,
         EnginesArg::Jit => side.name.starts_with(EngineKind::Jit.name()),
         EnginesArg::Interp => side.name.starts_with(EngineKind::Interp.name()),
@@ -217,7 +205,7 @@ pub fn first_line(outcomes: &Outcomes<'_>) -> String {
     let mut line = format!("{} rows, {} variables compared", trace.len(), comparer.columns().len());
     line += &match driving.len() {
         0 => "; no column drives the program".to_string(),
-        1..=8 => format!("; driven by {}", driving.join(", ")),
+        1..=MOST_NAMES => format!("; driven by {}", driving.join(", ")),
         count => format!("; driven by {count} columns"),
     };
     line += &match &outcomes.found {
@@ -226,7 +214,10 @@ pub fn first_line(outcomes: &Outcomes<'_>) -> String {
         None => String::new(),
     };
     if !trace.left_out.is_empty() {
-        line += &format!("; {} columns left out", trace.left_out.len());
+        line +=
+            &format!("; left out: {}", trace.left_out.iter().take(MOST_NAMES).cloned().collect::<Vec<_>>().join(", "));
+        let more = trace.left_out.len().saturating_sub(MOST_NAMES);
+        line += &if more > 0 { format!(" and {more} more columns") } else { String::new() };
     }
     let (early, late) = comparer.not_compared();
     if early > 0 {
@@ -240,20 +231,33 @@ pub fn first_line(outcomes: &Outcomes<'_>) -> String {
 
 /// The last line.
 pub fn verdict(outcomes: &Outcomes<'_>) -> String {
-    let (differing, all) = (outcomes.comparer.differing(), outcomes.comparer.columns().len());
+    let Outcomes { comparer, ended, .. } = outcomes;
+    let (differing, all) = (comparer.differing(), comparer.columns().len());
     match differing {
-        0 => "equal within the tolerances".to_string(),
+        0 if comparer.values() == 0 => "nothing was compared".to_string(),
+        0 if ended.is_some() => format!("not compared to the end: {} values are equal so far", comparer.values()),
+        0 => match comparer.columns().iter().filter(|column| column.rows == 0).count() {
+            0 => "equal within the tolerances".to_string(),
+            none => format!("equal within the tolerances; of {none} of {all} variables no value was compared"),
+        },
         _ => format!("the program differs from the trace in {differing} of {all} variables"),
     }
 }
 
 /// What is allowed, in words.
-pub fn tolerance_text(column: &Compared) -> String {
+pub fn tolerance_text(outcomes: &Outcomes<'_>, column: &Compared) -> String {
+    let absolute = deviation_text(column.tolerance.absolute, &outcomes.trace.columns[column.column].domain);
     match (column.tolerance.absolute, column.tolerance.relative) {
         (0.0, 0.0) => "exact".to_string(),
-        (absolute, 0.0) => format!("± {absolute}"),
-        (absolute, relative) => format!("± ({absolute} + {relative} × |value|)"),
+        (_, 0.0) => format!("± {absolute}"),
+        (_, relative) => format!("± ({absolute} + {relative} × |value|)"),
     }
+}
+
+/// The largest deviation in words, when it is one of numbers.
+pub fn largest_text<'c>(outcomes: &Outcomes<'_>, column: &'c Compared) -> Option<(String, &'c Apart)> {
+    let largest = column.largest.as_ref().filter(|largest| largest.deviation.is_finite())?;
+    Some((deviation_text(largest.deviation, &outcomes.trace.columns[column.column].domain), largest))
 }
 
 /// A name, and the trace's when it is another one.
@@ -272,22 +276,21 @@ fn column_text(outcomes: &Outcomes<'_>, column: &Compared) -> String {
         text += &format!(
             ", {} differ ({}); first in line {}, at {:.6} s: trace {theirs}, program {ours}",
             column.beyond,
-            tolerance_text(column),
+            tolerance_text(outcomes, column),
             first.line,
             first.time_us as f64 / 1e6
         );
     }
     let is_bool = outcomes.trace.columns[column.column].domain == Domain::Elementary(ElementaryType::Bool);
-    match column.largest.as_ref().filter(|largest| largest.deviation.is_finite()) {
-        Some(largest) if !is_bool => {
+    match largest_text(outcomes, column) {
+        Some((deviation, largest)) if !is_bool => {
             text += &format!(
-                "; largest deviation {} in line {}, at {:.6} s",
-                largest.deviation,
+                "; largest deviation {deviation} in line {}, at {:.6} s",
                 largest.line,
                 largest.time_us as f64 / 1e6
             );
         }
-        None if column.largest.is_none() => text += ", equal",
+        None if column.largest.is_none() && column.rows > 0 => text += ", equal",
         _ => {}
     }
     text
@@ -320,7 +323,7 @@ fn json(outcomes: &Outcomes<'_>) -> Value {
     let driving: Vec<&str> = trace.columns.iter().filter(|c| c.drives).map(|c| c.name.as_str()).collect();
     json!({
         "equal": comparer.differing() == 0 && outcomes.ended.is_none(), "trace": outcomes.file, "rows": trace.len(), "offset_us": offset_us,
-        "aligned": outcomes.found.map(|found| json!({ "tries": found.tries, "beyond": found.beyond, "compared": found.compared })),
+        "aligned": outcomes.found.map(|found| json!({ "tries": found.tries, "beyond": found.beyond, "compared": found.compared })), "verdict": verdict(outcomes), "compared": comparer.values(),
         "driven_by": driving, "left_out": trace.left_out, "rows_before_start": early, "rows_not_reached": late, "ended": outcomes.ended,
         "variables": columns,
     })

@@ -8,7 +8,7 @@ use kilohertz::traces::compare::{Compared, MAX_CURVES};
 use kilohertz::traces::curve::{Curve, STRETCHES};
 
 use super::super::page::{END, escaped, head};
-use super::against::{Outcomes, column_name, first_line, tolerance_text, verdict};
+use super::against::{Outcomes, column_name, first_line, largest_text, tolerance_text, verdict};
 
 /// Height of a curve and of a digital lane, in pixels.
 const CURVE_HEIGHT: f64 = 140.0;
@@ -57,7 +57,7 @@ fn table(out: &mut String, outcomes: &Outcomes<'_>) {
             "<tr{class}><td>{}</td><td>{}</td><td>{}</td><td>{}</td>",
             escaped(&column_name(outcomes, column)),
             column.rows,
-            escaped(&tolerance_text(column)),
+            escaped(&tolerance_text(outcomes, column)),
             column.beyond
         );
         match &column.first {
@@ -72,9 +72,9 @@ fn table(out: &mut String, outcomes: &Outcomes<'_>) {
             }
             None => out.push_str("<td></td><td></td><td></td><td></td>"),
         }
-        match column.largest.as_ref().filter(|largest| largest.deviation.is_finite()) {
-            Some(largest) => {
-                let _ = write!(out, "<td>{}</td><td>{}</td></tr>", largest.deviation, seconds(largest.time_us));
+        match largest_text(outcomes, column) {
+            Some((deviation, largest)) => {
+                let _ = write!(out, "<td>{}</td><td>{}</td></tr>", escaped(&deviation), seconds(largest.time_us));
             }
             None => out.push_str("<td></td><td></td></tr>"),
         }

@@ -11,7 +11,7 @@ use kilohertz::lockstep::{EngineUnderTest, Lockstep, OpenError, Options};
 use serde_json::{Value, json};
 
 use super::super::args::{DiffArgs, Format};
-use super::super::inputs::{CsvInputs, set_values};
+use super::super::inputs::set_values;
 use super::super::output::{Failure, choose, load, people, result};
 use super::super::session::Session;
 use super::super::{Outcome, Status};
@@ -72,10 +72,10 @@ pub fn open<'s>(
     let (names, given) = (&session.names, &session.args.set);
     let mut scratch = session.program.image(session.args.max_image).map_err(Failure::refused)?;
     set_values(names, &mut scratch, given)?;
-    let mut sources = Vec::with_capacity(count);
-    for _ in 0..count {
-        sources.extend(session.inputs(&scratch)?.map(|rows: CsvInputs| Box::new(rows) as Box<dyn InputSource>));
-    }
+    // One table for all sides.
+    let rows = session.inputs(&scratch)?;
+    let sources = rows.iter().flat_map(|rows| std::iter::repeat_n(rows, count));
+    let sources = sources.map(|rows| Box::new(rows.clone()) as Box<dyn InputSource>).collect();
     let watchdog_us = if session.args.watchdog_us == 0 { DEFAULT_WATCHDOG_US } else { session.args.watchdog_us };
     let options = Options {
         max_image_bytes: session.args.max_image,

@@ -8,9 +8,11 @@ mod random;
 
 use super::Outcome;
 use super::args::DiffArgs;
+use super::output::Failure;
 
 /// Runs it.
 pub fn run(args: &DiffArgs) -> Outcome {
+    args.check().map_err(Failure::usage)?;
     let _planted = plant(args);
     match (&args.against, args.random) {
         (_, Some(count)) => random::run(args, count),

@@ -14,7 +14,7 @@ use khz_proof::statistics::Statistics;
 use serde_json::json;
 
 use super::super::args::{DiffArgs, Format};
-use super::super::output::{people, result};
+use super::super::output::{Failure, people, result};
 use super::super::{Outcome, Status};
 
 /// Scans of each program.
@@ -58,6 +58,11 @@ impl Programs {
 /// Runs it.
 pub fn run(args: &DiffArgs, count: u64) -> Outcome {
     let first = args.seed.unwrap_or(0);
+    if first.checked_add(count.div_ceil(2)).is_none() {
+        return Err(Failure::usage(format!(
+            "--seed {first}: the seeds of {count} programs from there on are beyond 64 bits"
+        )));
+    }
     let programs = Programs { first, count };
     let threads = args.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
     let campaign = Campaign { first, count: count.div_ceil(2), threads, most_findings: 1 };
@@ -79,11 +84,12 @@ pub fn run(args: &DiffArgs, count: u64) -> Outcome {
         text.report().trim_end(),
         containers.report().trim_end()
     );
+    let (compared, refused) = (text.programs + containers.programs, text.refused);
     if args.common.format == Format::Json {
         let difference =
             found.map(|found| json!({ "seed": found.seed, "description": found.description, "smallest": small }));
         result(
-            &json!({ "equal": found.is_none(), "programs": count, "seed": first, "seeds_done": report.done, "difference": difference, "reached": statistics })
+            &json!({ "equal": found.is_none(), "programs": count, "compared": compared, "refused": refused, "seed": first, "seeds_done": report.done, "difference": difference, "reached": statistics })
                 .to_string(),
         );
     } else {
@@ -92,7 +98,9 @@ pub fn run(args: &DiffArgs, count: u64) -> Outcome {
             (Some(found), Some(small)) => {
                 people(&format!("seed {} differs: {}\n{small}", found.seed, found.description));
             }
-            _ => people(&format!("equal: {count} programs, {SCANS} scans each, from seed {first} on")),
+            _ => people(&format!(
+                "equal: {count} programs, {SCANS} scans each, from seed {first} on ({compared} compared, {refused} refused by the compiler)"
+            )),
         }
     }
     Ok(if found.is_some() { Status::Differ } else { Status::Done })
@@ -127,7 +135,7 @@ fn check(args: &DiffArgs, programs: Programs, seed: u64, reached: &mut Reached) 
     found.map(|found| format!("container: {}", first_lines(&found.description, 3)))
 }
 
-/// The smallest program that still differs, with both traces side by side where it is Structured Text.
+/// The smallest program that still differs: between the engines with both traces side by side, against its meaning with what differs first.
 fn smallest(args: &DiffArgs, programs: Programs, seed: u64) -> Option<String> {
     let _planted = super::plant(args);
     let case = Case::new(st::generate(seed), seed, SCANS as usize);
