@@ -85,6 +85,27 @@ fn a_loop_and_the_arm_of_an_if_are_cut_inside() {
 }
 
 #[test]
+fn what_a_turn_of_a_loop_leaves_for_the_next_one_survives_the_part_between() {
+    // Nobody but the part reads or assigns `m`; of one in an arm only some turns assign it.
+    let turn =
+        "slot.load l m\nconst.i32 3\ni32.add\nslot.store l m\nslot.load g b\nslot.load l m\ni32.add\nslot.store g b\n";
+    let some = format!("slot.load g a\nconst.i32 1\ni32.and\njump.if even\n{turn}even:\n");
+    for counting in [turn, &some] {
+        let text = program(&format!(
+            "top:\n{counting}{}slot.load g a\nconst.i32 200\ni32.lt_s\njump.if top\n",
+            statements(12).replace("g b", "g c")
+        ));
+        let text = text
+            .replace("local n i32\n", "local n i32\nlocal m i32\n")
+            .replace("slot.store g c\nreturn", "drop\nreturn");
+        for items in [4, 12, 30] {
+            assert!(form(&text, items).contains("part "), "{}", form(&text, items));
+            assert_eq!(outcome(&text, items), outcome(&text, 1 << 20), "{items}");
+        }
+    }
+}
+
+#[test]
 fn what_ends_a_function_early_is_not_cut_but_what_lies_around_it() {
     let early = "slot.load g b\nconst.i32 100\ni32.lt_s\njump.if on\nreturn\non:\n";
     let text = program(&format!("{}{early}{}", statements(20), statements(20).replace("over", "under")));

@@ -8,6 +8,7 @@
 //!
 //! The choice of stretches may be wrong (it compares sums); building the parts finds that out, and then nothing is cut.
 
+mod exposed;
 mod rename;
 pub mod slices;
 
@@ -132,13 +133,20 @@ impl<'f> Cutter<'f> {
         self.count_names(slice, &inner, &mut names);
         let mut variables = Vec::new();
         let mut results = Vec::new();
+        // In a loop a part runs again: what it reads before it assigns it may be what it assigned the last time.
+        let again = if self.is_in_loop(slice) {
+            exposed::variables(self.function, &self.order, slice, &inner)
+        } else {
+            BTreeSet::new()
+        };
         for (var, (reads, assignments)) in &names.variables {
             let (all_reads, all_assignments) = self.uses[var.index()];
-            let leaves = *assignments > 0 && all_reads > *reads;
+            let is_carried = *assignments > 0 && again.contains(var);
+            let leaves = is_carried || *assignments > 0 && all_reads > *reads;
             if leaves {
                 results.push(*var);
             }
-            if all_assignments > *assignments && (*reads > 0 || leaves) {
+            if is_carried || all_assignments > *assignments && (*reads > 0 || leaves) {
                 variables.push(*var);
             }
         }
@@ -153,6 +161,19 @@ impl<'f> Cutter<'f> {
         self.parts.push(part);
         let names = Names { values: inputs.iter().copied().collect(), variables: names.variables };
         Some(Cut { slice, number, inputs, variables, results, names })
+    }
+
+    /// Whether a stretch lies in a loop that it does not hold whole.
+    fn is_in_loop(&self, slice: Slice) -> bool {
+        let mut at = self.function.blocks[self.order.item(slice.start).0].innermost_loop;
+        while let Some(id) = at {
+            let data = &self.function.loops[id.index()];
+            if self.order.start(data.header.index()) < slice.start {
+                return true;
+            }
+            at = data.parent;
+        }
+        false
     }
 
     /// Frame and program memory, which every part gets.
@@ -249,7 +270,7 @@ impl Walk<'_, '_> {
     fn blocks(&mut self, slice: Slice, inner: Vec<Cut>, results: &[Var]) {
         let mut inner = inner.into_iter().peekable();
         let (mut block, mut number) = self.cutter.order.item(slice.start);
-        self.open(block, number == 0);
+        self.open(block, number == 0, true);
         // Whether the last block has no end yet.
         let mut open = true;
         while block < self.cutter.function.blocks.len() {
@@ -258,7 +279,8 @@ impl Walk<'_, '_> {
                 return self.finish((number == 0).then_some(block), open, results);
             }
             if !std::mem::replace(&mut open, true) {
-                self.open(block, true);
+                // A part that begins at the header of a loop holds the loop whole.
+                self.open(block, true, inner.peek().is_none_or(|cut| cut.slice.start != position));
             }
             if let Some(cut) = inner.next_if(|cut| cut.slice.start == position) {
                 self.call(&cut);
@@ -294,14 +316,14 @@ impl Walk<'_, '_> {
         }
     }
 
-    /// Starts a block: that of the function with its name and parameters, or what is left of it.
-    fn open(&mut self, block: usize, from_its_start: bool) {
+    /// Starts a block: that of the function with its name and parameters, and the loop that it is the header of, or what is left of it.
+    fn open(&mut self, block: usize, from_its_start: bool, has_its_loop: bool) {
         let data = &self.cutter.function.blocks[block];
         let (mut parameters, innermost_loop) = (Vec::new(), data.innermost_loop);
         if from_its_start {
             parameters.clone_from(&data.parameters);
             self.renamed.insert(Block(block as u32), Block(self.blocks.len() as u32));
-            self.loops.extend(self.cutter.headers[block]);
+            self.loops.extend(self.cutter.headers[block].filter(|_| has_its_loop));
         }
         for value in &parameters {
             let known = &mut self.cutter.defined_in[value.index()];
