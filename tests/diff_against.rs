@@ -115,6 +115,9 @@ fn a_changed_program_differs_from_the_row_on_at_which_it_is_another() {
     assert_eq!(alarm["beyond"], 2);
     let first = serde_json::json!({ "line": 28, "trace_us": 260_000, "time_us": 260_000, "trace": "TRUE", "program": "FALSE", "deviation": 1.0 });
     assert_eq!(alarm["first"], first);
+    let statement = &alarm["statement"];
+    assert_eq!((&statement["line"], &statement["text"]), (&12.into(), &"alarm := wait.Q;".into()), "{alarm}");
+    assert!(variable(&told, "main.level")["statement"].is_null(), "it does not differ");
     assert_eq!(variable(&told, "main.name")["first"]["trace"], "'high'");
     assert_eq!(variable(&told, "main.mode")["first"]["program"], "filling");
     assert_eq!(variable(&told, "main.level")["beyond"], 0);
@@ -124,6 +127,7 @@ fn a_changed_program_differs_from_the_row_on_at_which_it_is_another() {
         "{}",
         stderr(&human)
     );
+    assert!(stderr(&human).contains("written last at ") && stderr(&human).contains("      alarm := wait.Q;\n"));
     assert!(stderr(&human).contains("differs from the trace in 4 of 7 variables"), "{}", stderr(&human));
 }
 

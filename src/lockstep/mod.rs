@@ -19,8 +19,9 @@ use std::collections::BTreeMap;
 use khz_jit::JitError;
 use khz_machine::engine::Engine;
 use khz_machine::image::{Image, ImageTooLarge};
-use khz_machine::trap::TrapCode;
-use khz_machine::variables::VariableTable;
+use khz_machine::report::{DescribedPlace, describe as describe_place};
+use khz_machine::trap::{CodePlace, TrapCode};
+use khz_machine::variables::{Variable, VariableTable};
 use khz_scheduler::{FaultReport, InputSource, Round, TimeNs, Wake};
 
 use crate::pipeline::{EngineKind, Program};
@@ -314,6 +315,22 @@ impl<'p> Lockstep<'p> {
             }
         }
         Ok(summary)
+    }
+
+    /// For each variable the statement of the last round that wrote it last, then the calls that led there, innermost first; empty: none did, or it is
+    /// an array or a structure.
+    ///
+    /// # Errors
+    /// Why the round can not be repeated, for people.
+    pub fn writers(&self, variables: &[&Variable]) -> Result<Vec<Vec<DescribedPlace>>, String> {
+        let layout = self.image().layout();
+        let bytes: Vec<_> =
+            variables.iter().map(|variable| self.names.bytes_of(layout, variable).unwrap_or(0..0)).collect();
+        let replay = replay::replay(&self.program.verified, &self.record.lock(), &bytes)?;
+        let container = self.program.container();
+        let described =
+            |places: &Vec<CodePlace>| places.iter().map(|place| describe_place(*place, container)).collect();
+        Ok(replay.writers.iter().map(described).collect())
     }
 
     /// Runs on after a difference and adds the variables that come to differ later, until the pair of sides ends otherwise or has run `rounds` more rounds.

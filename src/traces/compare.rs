@@ -1,8 +1,10 @@
 //! Row by row: what the program has at the time of each row of a trace.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use khz_machine::image::Image;
+use khz_machine::report::DescribedPlace;
 use khz_machine::variables::VariableTable;
 use khz_scheduler::{FaultReport, Wake};
 
@@ -13,6 +15,8 @@ use super::tolerance::{Tolerance, Tolerances};
 use crate::lockstep::difference::Difference;
 use crate::lockstep::{Lockstep, Progress};
 
+/// Rounds that are repeated for the statements that wrote something in them, at most: the third evaluator is slow.
+const MAX_REPEATED: usize = 20;
 /// Columns that get curves, at most.
 pub const MAX_CURVES: usize = 256;
 
@@ -43,6 +47,8 @@ pub struct Apart {
     pub values: [Sample; 2],
     /// How far they lie apart; infinite when they are no numbers.
     pub deviation: f64,
+    /// The round that the program's value is of, from 1.
+    pub round: u64,
 }
 
 /// What a column came to.
@@ -77,7 +83,8 @@ pub struct Comparer {
     last: Vec<Sample>,
     /// The first row that is not compared yet.
     next: usize,
-    has_run: bool,
+    /// Rounds so far.
+    rounds: u64,
     /// Rows before the program's start.
     early: u64,
 }
@@ -112,7 +119,7 @@ impl Comparer {
         let columns: Vec<Compared> = columns.collect();
         let last = vec![Sample::Nothing; columns.len()];
         let (trace, names, texts) = (trace.clone(), names.clone(), trace.texts.clone());
-        Comparer { trace, names, terms, texts, columns, last, next: 0, has_run: false, early: 0 }
+        Comparer { trace, names, terms, texts, columns, last, next: 0, rounds: 0, early: 0 }
     }
 
     /// Whether every row is compared.
@@ -160,7 +167,7 @@ impl Comparer {
                 ours.add(time_us, value);
             }
         }
-        self.has_run = true;
+        self.rounds += 1;
         let row_is_now = !self.is_over() && self.row_time_us(self.next) == time_us;
         if self.terms.on_change && !row_is_now && self.next > 0 && !self.is_over() {
             self.compare(self.next - 1, time_us);
@@ -177,7 +184,7 @@ impl Comparer {
     fn compare_row(&mut self) {
         let (row, time_us) = (self.next, self.row_time_us(self.next));
         self.next += 1;
-        if !self.has_run || time_us < 0 {
+        if self.rounds == 0 || time_us < 0 {
             self.early += 1;
             return;
         }
@@ -208,6 +215,7 @@ impl Comparer {
                 time_us,
                 values: [theirs, *ours],
                 deviation,
+                round: self.rounds,
             };
             if column.largest.as_ref().is_none_or(|largest| deviation > largest.deviation) {
                 column.largest = Some(apart());
@@ -268,4 +276,35 @@ pub fn run(
         comparer.finish();
     }
     Ok(End::Over)
+}
+
+/// For each compared column with a first difference the statement that wrote the variable last in that round, then the calls that led there: `lockstep`, which
+/// has not started, runs once more up to the last of these rounds. Empty: no statement of the round wrote it, or it is not known.
+#[must_use]
+pub fn writers(lockstep: &mut Lockstep<'_>, comparer: &Comparer) -> Vec<Vec<DescribedPlace>> {
+    let mut found = vec![Vec::new(); comparer.columns.len()];
+    let mut rounds: BTreeMap<u64, Vec<usize>> = BTreeMap::new();
+    for (position, column) in comparer.columns.iter().enumerate() {
+        if let Some(first) = &column.first {
+            rounds.entry(first.round).or_default().push(position);
+        }
+    }
+    if !matches!(lockstep.start(), Ok(None)) {
+        return found;
+    }
+    let mut run = 0;
+    for (round, positions) in rounds.into_iter().take(MAX_REPEATED) {
+        while run < round {
+            run += 1;
+            if !matches!(lockstep.round(), Ok(Progress::Ran { .. })) {
+                return found;
+            }
+        }
+        let variables: Vec<_> =
+            positions.iter().map(|at| &comparer.trace.columns[comparer.columns[*at].column].variable).collect();
+        for (position, places) in positions.iter().zip(lockstep.writers(&variables).unwrap_or_default()) {
+            found[*position] = places;
+        }
+    }
+    found
 }

@@ -5,11 +5,11 @@ use std::sync::Arc;
 
 use khz_bytecode::container::ElementaryType;
 use khz_frontend::source::SourceMap;
-use khz_machine::report::TrapReport;
+use khz_machine::report::{DescribedPlace, TrapReport};
 use khz_machine::variables::Domain;
 use khz_scheduler::InputSource;
 use kilohertz::files;
-use kilohertz::lockstep::EngineUnderTest;
+use kilohertz::lockstep::{EngineUnderTest, Lockstep};
 use kilohertz::pipeline::EngineKind;
 use kilohertz::traces::align::{self, Found};
 use kilohertz::traces::compare::{self, Apart, Compared, Comparer, End, Terms};
@@ -23,7 +23,7 @@ use super::super::output::{Failure, choose, load, people, result, write_file};
 use super::super::session::Session;
 use super::super::{Outcome, Status};
 use super::curves;
-use super::engines::{open, refused, report_difference};
+use super::engines::{open, place_json, refused, report_difference, written_text};
 
 /// Rounds that the program may run along a trace without `--scans`.
 const DEFAULT_ROUNDS: u64 = 10_000_000;
@@ -48,6 +48,9 @@ pub struct Outcomes<'o> {
     pub found: Option<Found>,
     /// Why the comparison says nothing about the whole trace, if so.
     pub ended: Option<String>,
+    /// For each compared column the statement that made its first difference, and the calls that led there.
+    statements: Vec<Vec<DescribedPlace>>,
+    sources: &'o SourceMap,
 }
 
 /// Runs it.
@@ -65,11 +68,8 @@ pub fn run(args: &DiffArgs, path: &Path) -> Outcome {
     let found = align(args, &session, &trace, &names, &mut terms)?;
     let offset_us = terms.offset_us;
 
-    let mut lockstep = open(&session, engines(args, &session)?, false)?;
-    if let Some(drive) = Drive::new(&trace, &names, offset_us) {
-        let sources = (0..lockstep.sides()).map(|_| Box::new(drive.clone()) as Box<dyn InputSource>);
-        lockstep.set_inputs(sources.collect());
-    }
+    let drive = Drive::new(&trace, &names, offset_us);
+    let mut lockstep = along(&session, engines(args, &session)?, drive.as_ref())?;
     let mut comparer = Comparer::new(&trace, &names, terms);
     let rounds = args.scans.unwrap_or(DEFAULT_ROUNDS);
     let end = match compare::run(&mut lockstep, &mut comparer, rounds, trace.len()) {
@@ -87,8 +87,14 @@ pub fn run(args: &DiffArgs, path: &Path) -> Outcome {
             "the trace goes on after {rounds} rounds (--scans N: more of them; --align auto or US: it begins at another time)"
         )),
     };
+    let statements = if comparer.differing() > 0 {
+        compare::writers(&mut along(&session, vec![one_engine(args, &session)?], drive.as_ref())?, &comparer)
+    } else {
+        Vec::new()
+    };
     let file = path.display().to_string();
-    let outcomes = Outcomes { file, trace: &trace, comparer: &comparer, offset_us, found, ended };
+    let outcomes =
+        Outcomes { file, trace: &trace, comparer: &comparer, offset_us, found, ended, statements, sources: &sources };
     if let Some(path) = &args.report {
         write_file(path, curves::page(&outcomes).as_bytes())?;
     }
@@ -165,12 +171,29 @@ fn align(
             offset.ok_or_else(|| Failure::usage(format!("--align {wanted}: microseconds or `auto` are wanted")))?;
         return Ok(None);
     }
-    let engine =
-        EngineUnderTest::new(&session.program, EngineKind::Jit, true, args.resource.max_image).map_err(refused)?;
-    let mut lockstep = open(session, vec![engine], false)?;
+    let mut lockstep = open(session, vec![one_engine(args, session)?], false)?;
     let found = align::find(&mut lockstep, trace, names, terms);
     terms.offset_us = found.offset_us;
     Ok(Some(found))
+}
+
+/// The program on these engines, driven by the trace.
+fn along<'s>(
+    session: &'s Session<'_>,
+    engines: Vec<EngineUnderTest>,
+    drive: Option<&Drive>,
+) -> Result<Lockstep<'s>, Failure> {
+    let mut lockstep = open(session, engines, false)?;
+    if let Some(drive) = drive {
+        let sources = (0..lockstep.sides()).map(|_| Box::new(drive.clone()) as Box<dyn InputSource>);
+        lockstep.set_inputs(sources.collect());
+    }
+    Ok(lockstep)
+}
+
+/// One engine, for runs beside the comparison.
+fn one_engine(args: &DiffArgs, session: &Session<'_>) -> Result<EngineUnderTest, Failure> {
+    EngineUnderTest::new(&session.program, EngineKind::Jit, true, args.resource.max_image).map_err(refused)
 }
 
 fn engines(args: &DiffArgs, session: &Session<'_>) -> Result<Vec<EngineUnderTest>, Failure> {
@@ -189,8 +212,11 @@ fn print(format: Format, outcomes: &Outcomes<'_>) {
         return;
     }
     people(&first_line(outcomes));
-    for column in outcomes.comparer.columns() {
+    for (position, column) in outcomes.comparer.columns().iter().enumerate() {
         people(&format!("  {}", column_text(outcomes, column)));
+        if let Some((place, callers)) = outcomes.statements.get(position).and_then(|places| places.split_first()) {
+            people(&format!("    {}", written_text(place, callers, outcomes.sources)));
+        }
     }
     if let Some(ended) = &outcomes.ended {
         people(ended);
@@ -310,12 +336,15 @@ fn json(outcomes: &Outcomes<'_>) -> Value {
     let columns: Vec<Value> = comparer
         .columns()
         .iter()
-        .map(|column| {
+        .enumerate()
+        .map(|(position, column)| {
             let found = &trace.columns[column.column];
+            let statement = outcomes.statements.get(position).and_then(|places| places.first());
             json!({
                 "column": found.name, "variable": found.variable.name, "compared": column.rows, "beyond": column.beyond,
                 "tolerance": { "absolute": column.tolerance.absolute, "relative": column.tolerance.relative },
                 "largest": apart(column, &column.largest), "first": apart(column, &column.first),
+                "statement": statement.map(|place| place_json(place, outcomes.sources)),
             })
         })
         .collect();

@@ -160,14 +160,26 @@ fn variable_text(found: &Difference, variable: &DifferingVariable, sources: &Sou
         text += &format!("  the third evaluator has {value}\n");
         text += &match variable.statement.split_first() {
             None => "  no statement of this round writes it there\n".to_string(),
-            Some((place, callers)) => {
-                let line = source_line(place, sources).map_or_else(String::new, |line| format!("\n      {line}"));
-                let callers: Vec<String> = callers.iter().map(|caller| format!("\n    called from {caller}")).collect();
-                format!("  written last at {place}{line}{}\n", callers.concat())
-            }
+            Some((place, callers)) => format!("  {}\n", written_text(place, callers, sources)),
         };
     }
     text
+}
+
+/// Where something was written last, with the line of the source and the calls that led there.
+pub fn written_text(place: &DescribedPlace, callers: &[DescribedPlace], sources: &SourceMap) -> String {
+    let line = source_line(place, sources).map_or_else(String::new, |line| format!("\n      {line}"));
+    let callers: Vec<String> = callers.iter().map(|caller| format!("\n    called from {caller}")).collect();
+    format!("written last at {place}{line}{}", callers.concat())
+}
+
+/// A place for programs.
+pub fn place_json(place: &DescribedPlace, sources: &SourceMap) -> Value {
+    let source = place.source.as_ref();
+    json!({
+        "function": place.function, "offset": place.offset, "file": source.map(|s| &s.file), "line": source.map(|s| s.line),
+        "column": source.map(|s| s.column), "text": source_line(place, sources),
+    })
 }
 
 /// The line of the source that a place is in, without the spaces around it.
@@ -181,13 +193,7 @@ fn source_line<'s>(place: &DescribedPlace, sources: &'s SourceMap) -> Option<&'s
 fn difference_json(found: &Difference, sources: &SourceMap) -> Value {
     let [first, second] = &found.sides;
     let pair = |values: &[String; 2]| json!({ first.as_str(): values[0], second.as_str(): values[1] });
-    let place = |place: &DescribedPlace| {
-        let source = place.source.as_ref();
-        json!({
-            "function": place.function, "offset": place.offset, "file": source.map(|s| &s.file), "line": source.map(|s| s.line),
-            "column": source.map(|s| s.column), "text": source_line(place, sources),
-        })
-    };
+    let place = |place: &DescribedPlace| place_json(place, sources);
     let variables: Vec<Value> = found.variables.iter().map(|variable| {
         json!({
             "name": variable.name, "round": variable.round, "time_us": variable.time.as_us(), "values": pair(&variable.values),
