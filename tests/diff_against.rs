@@ -430,6 +430,8 @@ fn the_report_is_one_page_with_both_curves() {
     assert!(page.contains("<title>line 28, 0.260000 s: trace TRUE, program FALSE</title>"));
     assert!(page.contains("<td>28</td><td>0.260000 s</td><td>TRUE</td><td>FALSE</td>"));
     assert!(!page.contains("<script") && !page.contains("http://") && !page.contains("https://"));
+    let (head, body) = page.split_once("</head>").unwrap();
+    assert!(head.contains(".theirs{") && !body.contains("<style"), "styles stand in the head");
     assert!(page.ends_with("</body></html>") && page.len() < 200_000, "{} bytes", page.len());
 }
 

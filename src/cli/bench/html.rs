@@ -15,7 +15,7 @@ const HEIGHT: usize = 160;
 
 /// The page of `khz bench --report`.
 pub fn page(file: &str, all: &[Figures]) -> String {
-    let mut out = head("khz bench", &format!("Time of a scan: {}", escaped(file)));
+    let mut out = head("khz bench", "", &format!("Time of a scan: {}", escaped(file)));
     out.push_str("<table><tr><th>engine</th><th>median</th><th>min</th><th>p99</th><th>p99.9</th><th>max</th><th>scans</th><th>code bytes</th><th>front end</th><th>verify</th><th>engine</th></tr>");
     for figures in all {
         let d = figures.measured.distribution;
@@ -38,7 +38,7 @@ pub fn page(file: &str, all: &[Figures]) -> String {
 
 /// The page of `khz bench --jitter --report`.
 pub fn jitter_page(statistics: &StatisticsReport, names: &[String]) -> String {
-    let mut out = head("khz bench --jitter", "Start latency of each task on the real clock");
+    let mut out = head("khz bench --jitter", "", "Start latency of each task on the real clock");
     out.push_str("<table><tr><th>task</th><th>starts</th><th>min</th><th>median</th><th>p99</th><th>p99.9</th><th>max</th><th>overruns</th></tr>");
     for (position, task) in statistics.tasks.iter().enumerate() {
         let Some(late) = &task.jitter else { continue };

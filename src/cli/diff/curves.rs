@@ -17,13 +17,12 @@ const LANE_HEIGHT: f64 = 44.0;
 const MARGIN: f64 = 8.0;
 const AXIS_HEIGHT: f64 = 18.0;
 
-const STYLE: &str = "<style>polyline,path{fill:none;stroke-width:1.5}.theirs{stroke:#d9822b}.ours{stroke:#3b6ea5}.band{fill:#d9822b;opacity:.18;stroke:none}\
-.first{stroke:#c23030;stroke-dasharray:4 3}.bad{color:#c23030}.key{display:inline-block;width:1.6em;height:.5em;margin:0 .4em 0 1em}h2{font-size:1.05em;margin:1.4em 0 .2em}</style>";
+const STYLE: &str = "polyline,path{fill:none;stroke-width:1.5}.theirs{stroke:#d9822b}.ours{stroke:#3b6ea5}.band{fill:#d9822b;opacity:.18;stroke:none}\
+.first{stroke:#c23030;stroke-dasharray:4 3}.bad{color:#c23030}.key{display:inline-block;width:1.6em;height:.5em;margin:0 .4em 0 1em}h2{font-size:1.05em;margin:1.4em 0 .2em}";
 
 /// The whole page.
 pub fn page(outcomes: &Outcomes<'_>) -> String {
-    let mut out = head("khz diff --against", &format!("Program against {}", escaped(&outcomes.file)));
-    out.push_str(STYLE);
+    let mut out = head("khz diff --against", STYLE, &format!("Program against {}", escaped(&outcomes.file)));
     // Writing to a String does not fail, here and below.
     let _ = write!(out, "<p><b>{}</b></p><p>{}</p>", escaped(&verdict(outcomes)), escaped(&first_line(outcomes)));
     if let Some(ended) = &outcomes.ended {
