@@ -16,6 +16,7 @@ use common::{files, root};
 use khz_bytecode::container::{Container, read, write};
 use khz_bytecode::verify::verify;
 use khz_frontend::{CompileOptions, SourceInput};
+use khz_proof::harness::programs;
 
 /// Most bytes of a mutant.
 const MOST_BYTES: usize = 1 << 16;
@@ -61,9 +62,10 @@ fn target(name: &str) -> &'static Target {
 
 #[test]
 fn sources() {
-    let programs = ["tests/programs", "examples", "tests/st"].map(|folder| files(&root().join(folder), "st"));
-    let programs = programs.iter().flatten().map(|path| {
-        let bytes = std::fs::read(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+    // Those of the conformance suite are many; `proof/tests/mutants.rs` has them.
+    let folders = programs::PROGRAMS.iter().filter(|folder| **folder != "tests/conformance");
+    let programs = folders.flat_map(|folder| programs::files(&root().join(folder), &["st"])).map(|path| {
+        let bytes = std::fs::read(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
         (path.display().to_string(), bytes)
     });
     let inputs: Vec<_> = all(&corpus("source")).into_iter().chain(programs).collect();

@@ -59,6 +59,7 @@ fn main() {
     }
     println!("{} programs, {} mutants, {} refused", files.len(), tally.mutants, tally.refused);
     println!("diagnostics without a place in the file: {}", tally.without_place);
+    println!("neither compiled nor refused: {}", tally.silent);
     println!("refused mutants by number of diagnostics: {:?}", tally.counts);
     println!("at most 3: {} of 1000", tally.few_per_mille());
 }

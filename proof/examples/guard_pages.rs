@@ -28,5 +28,5 @@ fn main() -> ExitCode {
         guarded_search::SCANS,
         report.figures.report()
     );
-    ExitCode::from(u8::from(!report.findings.is_empty()))
+    common::finish(report.findings.len())
 }

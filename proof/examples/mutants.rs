@@ -12,6 +12,7 @@ mod common;
 mod measure;
 
 use std::path::PathBuf;
+use std::process::ExitCode;
 use std::sync::Arc;
 
 use common::Arguments;
@@ -39,18 +40,18 @@ impl Figures for Seen {
     }
 }
 
-fn main() {
+fn main() -> ExitCode {
     let mut arguments = Arguments::read(10_000, &[]);
     let words = std::mem::take(&mut arguments.words);
     if words.iter().any(|word| word == "run") {
-        run(&arguments);
+        run(&arguments)
     } else {
         let folders: Vec<PathBuf> = words.iter().map(PathBuf::from).collect();
-        verify(&arguments, &folders);
+        verify(&arguments, &folders)
     }
 }
 
-fn verify(arguments: &Arguments, folders: &[PathBuf]) {
+fn verify(arguments: &Arguments, folders: &[PathBuf]) -> ExitCode {
     let pool = bases::pool(GENERATED, &bases::texts(0, folders));
     println!("{} containers, smallest, middle and largest of {:?} bytes", pool.len(), pool.sizes());
     let report = arguments.search(|seed: u64, seen: &mut Seen| {
@@ -73,6 +74,7 @@ fn verify(arguments: &Arguments, folders: &[PathBuf]) {
         println!("==== seed {}, {:?}: {} ({path}: {written:?})", finding.seed, mutant.kinds, finding.description);
     }
     println!("{}{}", report.figures.tally.report(), report.figures.costs.report());
+    common::finish(report.findings.len())
 }
 
 /// What a search that runs mutants counts.
@@ -89,7 +91,7 @@ impl Figures for Ran {
     }
 }
 
-fn run(arguments: &Arguments) {
+fn run(arguments: &Arguments) -> ExitCode {
     let report = arguments.search(|seed: u64, ran: &mut Ran| {
         let makers = engines::makers();
         for (number, verified) in accepted(seed, TRIES) {
@@ -116,4 +118,5 @@ fn run(arguments: &Arguments) {
         ran.mutants,
         ran.statistics.report()
     );
+    common::finish(report.findings.len())
 }

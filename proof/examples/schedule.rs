@@ -4,6 +4,9 @@
 
 #[path = "common/mod.rs"]
 mod common;
+
+use std::process::ExitCode;
+
 use common::Arguments;
 use khz_proof::harness::engines;
 use khz_proof::harness::schedule::{Tally, check_seed};
@@ -11,11 +14,12 @@ use khz_proof::harness::schedule::{Tally, check_seed};
 /// Questions that the shrinker may ask.
 const TRIES: usize = 1000;
 
-fn main() {
+fn main() -> ExitCode {
     let arguments = Arguments::read(1000, &[]);
     let report = arguments.search(|seed, tally: &mut Tally| check_seed(seed, &engines::makers(), tally, TRIES));
     for finding in &report.findings {
         println!("==== {}", finding.description);
     }
     println!("{}", report.figures.report());
+    common::finish(report.findings.len())
 }

@@ -13,6 +13,7 @@ mod common;
 mod measure;
 
 use std::path::PathBuf;
+use std::process::ExitCode;
 
 use checked::Checked;
 use common::Arguments;
@@ -40,7 +41,7 @@ impl Figures for Seen {
     }
 }
 
-fn main() {
+fn main() -> ExitCode {
     let mut arguments = Arguments::read(10_000, &[]);
     let (first, count) = (arguments.first, arguments.count);
     let folders: Vec<PathBuf> = arguments.words.iter().map(PathBuf::from).collect();
@@ -59,6 +60,9 @@ fn main() {
         let written = std::fs::write("source.st", mutant(&texts, first).bytes);
         println!("source.st: {written:?}");
     }
+    for finding in &report.findings {
+        println!("==== batch {}: {}", finding.seed, finding.description);
+    }
     for finding in &seen.findings {
         let path = format!("source-{}.st", finding.seed);
         let mutant = mutant(&texts, finding.seed);
@@ -66,7 +70,9 @@ fn main() {
         println!("==== seed {}, {:?}: {} ({path}: {written:?})", finding.seed, mutant.kinds, finding.description);
     }
     println!("{}{}", seen.checked.report(), seen.costs.report());
-    println!("{} findings in {} sources", seen.findings.len() + report.findings.len(), seen.checked.total);
+    let findings = seen.findings.len() + report.findings.len();
+    println!("{findings} findings in {} sources", seen.checked.total);
+    common::finish(findings)
 }
 
 fn look_at(texts: &[Vec<u8>], seeds: std::ops::Range<u64>) -> Seen {

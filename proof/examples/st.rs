@@ -30,5 +30,5 @@ fn main() -> ExitCode {
         }
     }
     println!("{}", report.figures.report());
-    ExitCode::from(u8::from(!report.findings.is_empty()))
+    common::finish(report.findings.len())
 }

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use khz_frontend::{CompileOptions, Dialect, SourceInput};
+use khz_proof::harness::programs::{PROGRAMS, WORKLOADS};
 use kilohertz::lockstep::inputs::RandomInputs;
 use kilohertz::lockstep::{EngineUnderTest, Lockstep, Options, Summary};
 use kilohertz::pipeline::{self, Program, Refused};
@@ -54,12 +55,7 @@ pub fn sources(folder: &Path) -> Vec<PathBuf> {
 
 /// The folders of this repository that hold programs, and the workloads where they are present.
 pub fn folders(root: &Path) -> Vec<PathBuf> {
-    let own = ["examples", "tests/programs", "tests/schedules", "tests/st", "tests/conformance"];
-    own.iter()
-        .map(|folder| root.join(folder))
-        .chain([root.join("../shared/workloads")])
-        .filter(|f| f.exists())
-        .collect()
+    PROGRAMS.iter().map(|folder| root.join(folder)).chain([root.join(WORKLOADS)]).filter(|f| f.exists()).collect()
 }
 
 /// Runs every program of some files, on some threads; what is wrong comes in the order of the files.

@@ -2,7 +2,7 @@
 
 use khz_frontend::diagnostics::{Diagnostic, has_errors};
 use khz_frontend::syntax::lexer::{Token, TokenKind, lex};
-use khz_frontend::{CompileOptions, SourceInput, check};
+use khz_frontend::{CompileOptions, SourceInput, compile};
 
 /// What was done to a token.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -41,6 +41,8 @@ pub fn mutant(text: &str, tokens: &[Token], at: usize, slip: Slip) -> Option<Str
 #[derive(Debug)]
 pub struct Verdict {
     pub refused: bool,
+    /// Whether a container came of it.
+    pub is_compiled: bool,
     pub diagnostics: Vec<Diagnostic>,
     /// `LINE:COLUMN CODE message` of each.
     pub lines: Vec<String>,
@@ -48,10 +50,10 @@ pub struct Verdict {
     pub without_place: usize,
 }
 
-/// Checks a program.
+/// Compiles a program.
 pub fn verdict(text: &str) -> Verdict {
     let source = SourceInput { name: "m.st".to_owned(), bytes: text.as_bytes().to_vec() };
-    let found = check(&[source], &CompileOptions::default());
+    let found = compile(&[source], &CompileOptions::default());
     let inside = |one: &Diagnostic| {
         let file = found.sources.file(one.span.file);
         file.is_some_and(|file| file.name() == "m.st" && one.span.end as usize <= file.text().len())
@@ -60,6 +62,7 @@ pub fn verdict(text: &str) -> Verdict {
     let line = |one: &Diagnostic| format!("{} {} {}", found.sources.place(one.span), one.code(), one.message);
     Verdict {
         refused: has_errors(&found.diagnostics),
+        is_compiled: !found.resources.is_empty(),
         lines: found.diagnostics.iter().map(line).collect(),
         without_place,
         diagnostics: found.diagnostics,
@@ -72,6 +75,8 @@ pub struct Tally {
     pub mutants: usize,
     pub refused: usize,
     pub without_place: usize,
+    /// Mutants that give no container, and nothing says why.
+    pub silent: usize,
     /// How many refused mutants have this many diagnostics (the last entry: or more).
     pub counts: [usize; 12],
 }
@@ -80,6 +85,7 @@ impl Tally {
     pub fn add(&mut self, verdict: &Verdict) {
         self.mutants += 1;
         self.without_place += verdict.without_place;
+        self.silent += usize::from(!verdict.is_compiled && !verdict.refused);
         if verdict.refused {
             self.refused += 1;
             let last = self.counts.len() - 1;

@@ -3,6 +3,7 @@
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "a program for people")]
 
 use std::collections::BTreeMap;
+use std::process::ExitCode;
 use std::time::Instant;
 
 use khz_proof::campaign::{Campaign, Figures, Report};
@@ -96,6 +97,11 @@ impl Arguments {
         );
         report
     }
+}
+
+/// How every example ends: with status 5 when it found anything.
+pub fn finish(findings: usize) -> ExitCode {
+    ExitCode::from(if findings == 0 { 0 } else { 5 })
 }
 
 fn usage(options: &[&str]) -> ! {

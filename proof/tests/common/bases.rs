@@ -1,40 +1,20 @@
 //! The programs of this repository, as what mutants are made of.
 #![allow(dead_code, reason = "each user takes its part")]
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use ed25519_dalek::{Signer, SigningKey};
 use khz_bytecode::assembler::assemble;
 use khz_bytecode::container::{Container, content_hash, debug_hash, signature_section, strip};
 use khz_frontend::{CompileOptions, SourceInput, compile};
 use khz_proof::bytecode::generate;
+use khz_proof::harness::programs::{PROGRAMS, files, root};
 use khz_proof::mutate::Pool;
 use khz_proof::st;
 
-fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
-}
-
-/// Every file below a folder with one of these endings, by path. A folder that is not there has none.
-fn files(folder: &Path, endings: &[&str]) -> Vec<PathBuf> {
-    let mut found = Vec::new();
-    let mut folders = vec![folder.to_path_buf()];
-    while let Some(folder) = folders.pop() {
-        for path in std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path()) {
-            if path.is_dir() {
-                folders.push(path);
-            } else if path.extension().is_some_and(|ending| endings.iter().any(|wanted| ending == *wanted)) {
-                found.push(path);
-            }
-        }
-    }
-    found.sort();
-    found
-}
-
 /// The Structured Text of the repository and of further folders, and `generated` programs of the generator.
 pub fn texts(generated: u64, further: &[PathBuf]) -> Vec<Vec<u8>> {
-    let own = ["tests/conformance", "tests/programs", "tests/st", "examples"].map(|folder| root().join(folder));
+    let own = PROGRAMS.map(|folder| root().join(folder));
     let paths = own.iter().chain(further).flat_map(|folder| files(folder, &["st"]));
     let texts = paths.map(|path| std::fs::read(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display())));
     texts.chain((0..generated).map(|seed| st::print::print(&st::generate(seed)).into_bytes())).collect()
