@@ -41,7 +41,9 @@ pub(super) fn variables(function: &Function, order: &Order, slice: Slice, inner:
             }
             Some(_) => {}
             None => {
-                data.terminator.targets().iter().for_each(|target| meet(&mut before, target.block.index(), &assigned))
+                for target in data.terminator.targets() {
+                    meet(&mut before, target.block.index(), &assigned);
+                }
             }
         }
         at += 1;
