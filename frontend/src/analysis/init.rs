@@ -8,7 +8,7 @@ use super::types::{Const, FieldDef, Ty, TyKind, Value};
 use super::{Analyzer, ConstKey};
 use crate::diagnostics::{semantic as rules, types as type_rules};
 use crate::source::Span;
-use crate::syntax::ast::{ArgKind, Expr, ExprKind, Init, InitElement, InitField, InitKind};
+use crate::syntax::ast::{ArgKind, Expr, ExprKind, Ident, Init, InitElement, InitField, InitKind};
 use crate::syntax::symbol::Symbol;
 
 /// Most runs that one array's initial value may have after repetition is taken out.
@@ -45,9 +45,13 @@ impl<'a> Analyzer<'a> {
             (InitKind::Struct(values), Some(TyKind::Block { fields, pou })) => {
                 self.record_init(values, &fields, Some(pou), scope)
             }
-            (InitKind::Expr(expr), Some(TyKind::Array { .. } | TyKind::Struct { .. } | TyKind::Block { .. })) => {
-                self.whole_value(expr, ty, scope)
+            (InitKind::Struct(values), Some(TyKind::Union { fields })) => {
+                self.union_init(values, &fields, ty, init.span, scope)
             }
+            (
+                InitKind::Expr(expr),
+                Some(TyKind::Array { .. } | TyKind::Struct { .. } | TyKind::Union { .. } | TyKind::Block { .. }),
+            ) => self.whole_value(expr, ty, scope),
             (InitKind::Expr(expr), _) => {
                 let found = Checker::declarations(self, scope).constant(expr, ty);
                 found.map_or(Value::Zero, |(_, value)| Value::Scalar(value))
@@ -173,12 +177,7 @@ impl<'a> Analyzer<'a> {
     ) -> Value {
         let mut list: Vec<Option<Value>> = vec![None; fields.len()];
         for value in values {
-            let Some(at) = self.field_position(fields, value.name.symbol) else {
-                let message = format!("there is no field `{}`", self.spelling(&value.name));
-                let known: Vec<Symbol> = fields.iter().map(|field| field.symbol).collect();
-                self.report_unknown(&rules::UNKNOWN_MEMBER, &value.name, message, known.into_iter());
-                continue;
-            };
+            let Some(at) = self.initialised_field(fields, &value.name) else { continue };
             if let Some(pou) = block {
                 self.check_init_access(pou, value.name.symbol, value.name.span);
             }
@@ -195,6 +194,17 @@ impl<'a> Analyzer<'a> {
             .filter(|(_, value)| !value.is_zero())
             .collect();
         Value::Record(list.into())
+    }
+
+    /// Position of the field that an initialiser names; reports when there is none.
+    pub(super) fn initialised_field(&mut self, fields: &[FieldDef], name: &Ident) -> Option<usize> {
+        let found = self.field_position(fields, name.symbol);
+        if found.is_none() {
+            let message = format!("there is no field `{}`", self.spelling(name));
+            let known: Vec<Symbol> = fields.iter().map(|field| field.symbol).collect();
+            self.report_unknown(&rules::UNKNOWN_MEMBER, name, message, known.into_iter());
+        }
+        found
     }
 
     fn check_init_access(&mut self, pou: PouId, symbol: Symbol, span: Span) {

@@ -9,6 +9,7 @@
 
 pub mod tree;
 pub mod types;
+mod union;
 
 mod call;
 mod config;

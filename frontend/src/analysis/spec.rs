@@ -50,7 +50,7 @@ impl<'a> Analyzer<'a> {
             TypeSpecKind::Subrange { base, range } => self.subrange_type(base, range, scope),
             TypeSpecKind::Enum { base, values } => self.enum_type(base.as_ref(), values, scope, name),
             TypeSpecKind::Array { dims, element } => self.array_type(dims, element, scope, spec.span),
-            TypeSpecKind::Struct { union: true, .. } => self.not_yet(spec.span, "UNION"),
+            TypeSpecKind::Struct { union: true, fields } => self.union_type(fields, scope, name, spec.span),
             TypeSpecKind::Struct { union: false, fields } => self.struct_type(fields, scope, name, spec.span),
             TypeSpecKind::Reference { .. } => self.not_yet(spec.span, "a reference type"),
             TypeSpecKind::Error => Ty::Error,
@@ -250,6 +250,7 @@ impl<'a> Analyzer<'a> {
             align: bytes,
             default: Value::Scalar(Const::Int(first)),
             depth: 1,
+            alternatives: 1,
         });
         if name.is_none() {
             for symbol in symbols {
@@ -304,7 +305,7 @@ impl<'a> Analyzer<'a> {
         Ty::User(id)
     }
 
-    fn too_deep(&mut self, inner: Ty, span: Span) -> bool {
+    pub(super) fn too_deep(&mut self, inner: Ty, span: Span) -> bool {
         let deep = self.types.depth(inner) as usize >= MAX_TYPE_DEPTH;
         if deep {
             self.report(&rules::TOO_DEEP, span, format!("types nest more than {MAX_TYPE_DEPTH} levels deep"));
@@ -313,6 +314,13 @@ impl<'a> Analyzer<'a> {
     }
 
     fn struct_type(&mut self, fields: &'a [VarDecl], scope: Option<PouId>, name: Option<&Ident>, span: Span) -> Ty {
+        let Some(list) = self.field_list(fields, scope) else { return Ty::Error };
+        let name = name.map_or("a structure", |name| self.spelling(name)).to_owned();
+        self.record_type(name, list, None, span).map_or(Ty::Error, Ty::User)
+    }
+
+    /// The fields of a structure or union, all at offset 0. `None`: a type among them is wrong, which was reported.
+    pub(super) fn field_list(&mut self, fields: &'a [VarDecl], scope: Option<PouId>) -> Option<Vec<FieldDef>> {
         let mut list: Vec<FieldDef> = Vec::new();
         let mut seen = std::collections::BTreeSet::new();
         let mut sound = true;
@@ -333,11 +341,7 @@ impl<'a> Analyzer<'a> {
                 list.push(FieldDef { symbol, name, ty, offset: 0, init: init.clone() });
             }
         }
-        if !sound {
-            return Ty::Error;
-        }
-        let name = name.map_or("a structure", |name| self.spelling(name)).to_owned();
-        self.record_type(name, list, None, span).map_or(Ty::Error, Ty::User)
+        sound.then_some(list)
     }
 
     /// Defines a structure, or the type of a function block's instances.
@@ -362,6 +366,7 @@ impl<'a> Analyzer<'a> {
             return None;
         };
         let depth = self.types.depth(deepest) + 1;
+        let alternatives = fields.iter().map(|field| self.types.alternatives(field.ty)).max().unwrap_or(1);
         let values: Vec<(u32, Value)> = (0u32..)
             .zip(&fields)
             .filter(|(_, field)| !field.init.is_zero())
@@ -373,6 +378,6 @@ impl<'a> Analyzer<'a> {
             Some(pou) => TyKind::Block { pou, fields },
             None => TyKind::Struct { fields },
         };
-        Some(self.types.add(TyDef { name, kind, size, align, default, depth }))
+        Some(self.types.add(TyDef { name, kind, size, align, default, depth, alternatives }))
     }
 }

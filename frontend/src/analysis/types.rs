@@ -123,6 +123,11 @@ pub enum TyKind {
         /// Its fields.
         fields: Rc<[FieldDef]>,
     },
+    /// A union: fields that all begin at offset 0.
+    Union {
+        /// Its fields.
+        fields: Rc<[FieldDef]>,
+    },
     /// A function block: its stored variables.
     Block {
         /// The function block.
@@ -162,6 +167,8 @@ pub struct TyDef {
     pub default: Value,
     /// How deep types nest in it.
     pub depth: u32,
+    /// How many ways a lookup in it may have to try: 1 without unions (verifier rule V0011).
+    pub alternatives: u32,
 }
 
 /// Lower and upper bound of each dimension.
@@ -217,9 +224,10 @@ impl TypeTable {
         };
         let bounds: Vec<String> = dims.iter().map(|(low, high)| format!("{low}..{high}")).collect();
         let name = format!("ARRAY[{}] OF {}", bounds.join(", "), self.name(element));
-        let depth = self.depth(element) + 1;
+        let (depth, alternatives) = (self.depth(element) + 1, self.alternatives(element));
         let kind = TyKind::Array { element, dims: dims.clone() };
-        let id = self.add(TyDef { name, kind, size: u32::try_from(bytes).ok()?, align, default, depth });
+        let size = u32::try_from(bytes).ok()?;
+        let id = self.add(TyDef { name, kind, size, align, default, depth, alternatives });
         self.arrays.insert((element, dims), id);
         Some(id)
     }
@@ -237,7 +245,7 @@ impl TypeTable {
         };
         let default = Value::Scalar(Const::Int(low));
         let kind = TyKind::Subrange { base, low, high };
-        let id = self.add(TyDef { name, kind, size: bytes, align: bytes, default, depth: 1 });
+        let id = self.add(TyDef { name, kind, size: bytes, align: bytes, default, depth: 1, alternatives: 1 });
         self.subranges.insert((base, low, high), id);
         id
     }
@@ -281,6 +289,14 @@ impl TypeTable {
         }
     }
 
+    /// How many ways a lookup in a variable may have to try: 1 without unions.
+    pub fn alternatives(&self, ty: Ty) -> u32 {
+        match ty {
+            Ty::User(id) => self.def(id).alternatives,
+            _ => 1,
+        }
+    }
+
     /// The elementary type that a scalar's values have: itself, an enumeration's or subrange's base.
     pub fn elementary(&self, ty: Ty) -> Option<ElementaryType> {
         match ty {
@@ -306,10 +322,10 @@ impl TypeTable {
         }
     }
 
-    /// Fields of a structure or function block.
+    /// Fields of a structure, union or function block.
     pub fn fields(&self, ty: Ty) -> Option<&Rc<[FieldDef]>> {
         match self.kind(ty)? {
-            TyKind::Struct { fields } | TyKind::Block { fields, .. } => Some(fields),
+            TyKind::Struct { fields } | TyKind::Union { fields } | TyKind::Block { fields, .. } => Some(fields),
             _ => None,
         }
     }

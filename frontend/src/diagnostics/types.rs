@@ -76,6 +76,11 @@ rules! {
         wrong "PROGRAM p\nVAR\n  s : STRING[0];\nEND_VAR\nEND_PROGRAM\n"
         right "PROGRAM p\nVAR\n  s : STRING[1];\nEND_VAR\nEND_PROGRAM\n"
     }
+    UNION = "T0015" Error "a type that no union may hold" {
+        "The fields of a union share their bytes. A function block instance has bytes of its own, and a subrange could not keep its values inside its range when another field is written: give the field the subrange's base type."
+        wrong "TYPE\n  U : UNION\n    level : INT (0..100);\n    raw : WORD;\n  END_UNION;\nEND_TYPE\nPROGRAM p\nVAR\n  u : U;\nEND_VAR\n  u.raw := 16#FFFF;\nEND_PROGRAM\n"
+        right "TYPE\n  U : UNION\n    level : INT;\n    raw : WORD;\n  END_UNION;\nEND_TYPE\nPROGRAM p\nVAR\n  u : U;\nEND_VAR\n  u.raw := 16#FFFF;\nEND_PROGRAM\n"
+    }
     NARROWED = "T0101" Warning "narrowed" {
         "The wider value keeps only its low bits. Say that it is meant: DINT_TO_INT(x). Under `--dialect iec` this is an error."
         wrong "PROGRAM p\nVAR\n  a : INT;\n  b : DINT;\nEND_VAR\n  a := b;\nEND_PROGRAM\n"

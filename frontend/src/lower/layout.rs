@@ -58,15 +58,17 @@ impl Builder<'_> {
                 }
                 self.add_type(Type::Array(array))
             }
-            (_, Some(TyKind::Struct { fields } | TyKind::Block { fields, .. })) => {
+            (_, Some(TyKind::Struct { fields } | TyKind::Union { fields } | TyKind::Block { fields, .. })) => {
                 let list =
                     fields.iter().map(|field| Field { offset: field.offset, ty: self.type_id(field.ty) }).collect();
                 let (size, align) = project.types.extent(ty);
                 let record = Record { size, align, fields: list };
-                if matches!(project.types.kind(ty), Some(TyKind::Block { .. })) {
-                    self.add_type(Type::Block { record, base: None, methods: Vec::new() })
-                } else {
-                    self.add_type(Type::Struct(record))
+                match project.types.kind(ty) {
+                    Some(TyKind::Block { .. }) => {
+                        self.add_type(Type::Block { record, base: None, methods: Vec::new() })
+                    }
+                    Some(TyKind::Union { .. }) => self.add_type(Type::Union(record)),
+                    _ => self.add_type(Type::Struct(record)),
                 }
             }
             _ => self.scalar_type(Storage::U8),
@@ -116,7 +118,10 @@ impl Builder<'_> {
                     }
                 }
             }
-            (Value::Record(values), Some(TyKind::Struct { fields } | TyKind::Block { fields, .. })) => {
+            (
+                Value::Record(values),
+                Some(TyKind::Struct { fields } | TyKind::Union { fields } | TyKind::Block { fields, .. }),
+            ) => {
                 for (at, value) in values.iter() {
                     let Some(field) = fields.get(*at as usize) else { continue };
                     let (start, size) = (field.offset as usize, types.extent(field.ty).0 as usize);
@@ -150,7 +155,10 @@ impl Builder<'_> {
                     at = at.saturating_add(count.saturating_mul(stride));
                 }
             }
-            (Value::Record(values), Some(TyKind::Struct { fields } | TyKind::Block { fields, .. })) => {
+            (
+                Value::Record(values),
+                Some(TyKind::Struct { fields } | TyKind::Union { fields } | TyKind::Block { fields, .. }),
+            ) => {
                 for (at, value) in values.iter() {
                     if let Some(field) = fields.get(*at as usize) {
                         self.init_runs(region, offset + field.offset, field.ty, value);
@@ -179,7 +187,7 @@ impl Builder<'_> {
                 let (size, stride) = (u64::from(types.extent(ty).0), u64::from(types.extent(*element).0.max(1)));
                 inner.saturating_mul(size / stride)
             }
-            (_, Some(TyKind::Struct { fields } | TyKind::Block { fields, .. })) => {
+            (_, Some(TyKind::Struct { fields } | TyKind::Union { fields } | TyKind::Block { fields, .. })) => {
                 fields.iter().map(|field| self.string_bytes(field.ty)).sum()
             }
             _ => 0,
@@ -215,7 +223,7 @@ impl Builder<'_> {
                 stride: project.types.extent(*element).0,
                 dimensions: dims.to_vec(),
             },
-            (_, Some(TyKind::Struct { fields } | TyKind::Block { fields, .. })) => {
+            (_, Some(TyKind::Struct { fields } | TyKind::Union { fields } | TyKind::Block { fields, .. })) => {
                 let visible = fields.iter().filter(|field| !field.name.starts_with("__"));
                 let fields =
                     visible.map(|field| (field.name.clone(), field.offset, self.debug_type(debug, field.ty))).collect();

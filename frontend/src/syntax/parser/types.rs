@@ -225,8 +225,9 @@ impl Parser<'_> {
     /// `structure = 'STRUCT' { declaration } 'END_STRUCT' | 'UNION' { declaration } 'END_UNION'`.
     fn struct_type(&mut self, end: Keyword, opener: &'static str) -> TypeSpecKind {
         let open = self.bump();
-        if self.eat_word("OVERLAP").is_some() {
+        if self.at_word("OVERLAP") {
             self.report_unsupported("OVERLAP");
+            self.bump();
         }
         let fields = self.declarations_until(&DeclList { end, opener, open, closed: true });
         TypeSpecKind::Struct { union: end == Keyword::EndUnion, fields }
