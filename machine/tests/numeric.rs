@@ -140,6 +140,63 @@ fn real(value: Value) -> f64 {
     }
 }
 
+const DAY_NS: i128 = 86_400_000_000_000;
+
+fn days_of_year(year: i128) -> i128 {
+    let is_leap = year.rem_euclid(4) == 0 && year.rem_euclid(100) != 0 || year.rem_euclid(400) == 0;
+    365 + i128::from(is_leap)
+}
+
+fn days_of_month(year: i128, month: i128) -> i128 {
+    match month {
+        2 => days_of_year(year) - 337,
+        4 | 6 | 9 | 11 => 30,
+        _ => 31,
+    }
+}
+
+/// Year, month and day, by walking from 1970-01-01.
+fn civil(mut days: i128) -> (i128, i128, i128) {
+    let (mut year, mut month) = (1970, 1);
+    while days < 0 {
+        year -= 1;
+        days += days_of_year(year);
+    }
+    while days >= days_of_year(year) {
+        days -= days_of_year(year);
+        year += 1;
+    }
+    while days >= days_of_month(year, month) {
+        days -= days_of_month(year, month);
+        month += 1;
+    }
+    (year, month, days + 1)
+}
+
+/// The start of a month that is counted from January of the year 0: eras of 400 years, then year by year.
+fn start_of_month(months: i128) -> i128 {
+    let (era, year, month) = (months.div_euclid(4800), months.rem_euclid(4800) / 12, months.rem_euclid(12) + 1);
+    let era_days: i128 = (0..400).map(days_of_year).sum();
+    let of_years = |years: std::ops::Range<i128>| years.map(days_of_year).sum::<i128>();
+    let days = era * era_days + of_years(0..year) + (1..month).map(|month| days_of_month(year, month)).sum::<i128>();
+    (days - of_years(0..1970)) * DAY_NS
+}
+
+/// What a row of the calendar gives. `None`: not such a row.
+fn calendar_model(name: &str, args: &[Value]) -> Option<i128> {
+    let (first, second) = (signed(*args.first()?), args.get(1).map_or(0, |second| signed(*second)));
+    Some(match name {
+        "start" => first - first.rem_euclid(DAY_NS),
+        "time" => first.rem_euclid(DAY_NS),
+        "weekday" => (first.div_euclid(DAY_NS) + 4).rem_euclid(7),
+        "year" => civil(first.div_euclid(DAY_NS)).0,
+        "month" => civil(first.div_euclid(DAY_NS)).1,
+        "day" => civil(first.div_euclid(DAY_NS)).2,
+        "of" => start_of_month(first) + (second - 1) * DAY_NS,
+        _ => return None,
+    })
+}
+
 /// What an integer row of `bits` bits gives, by 128-bit arithmetic. `None`: not an integer row.
 fn integer_model(name: &str, bits: u32, args: &[Value]) -> Option<Result<i128, TrapCode>> {
     let pick = |at: usize| if name.ends_with("_u") { unsigned(args[at]) } else { signed(args[at]) };
@@ -205,7 +262,7 @@ fn integer_model(name: &str, bits: u32, args: &[Value]) -> Option<Result<i128, T
         "saturate_u32" | "saturate_i64_u" => Ok(unsigned(args[0]).min(i32::MAX.into())),
         "saturate_i64_s" => Ok(signed(args[0]).clamp(i32::MIN.into(), i32::MAX.into())),
         "reinterpret_f32" | "reinterpret_f64" => Ok(unsigned(args[0])),
-        _ => return None,
+        _ => return calendar_model(name, args).map(Ok),
     })
 }
 

@@ -304,3 +304,80 @@ fn times_as_literals() {
     }
     assert_eq!((text_of(Value::I32(1)), text_of(Value::I32(0))), ("TRUE".to_string(), "FALSE".to_string()));
 }
+
+#[test]
+fn dates_and_times_of_day_as_literals() {
+    type From = fn(&mut [u8], StringPlace, i64);
+    type Form<'v> = (From, HelperOp, &'v [(i64, &'v str)]);
+    let forms: [Form<'_>; 3] = [
+        (
+            string_from_date,
+            HelperOp::StringToDate,
+            &[
+                (0, "D#1970-01-01"),
+                (-86_400_000_000_000, "D#1969-12-31"),
+                (1_709_164_800_000_000_000, "D#2024-02-29"),
+                (9_223_286_400_000_000_000, "D#2262-04-11"),
+            ],
+        ),
+        (
+            string_from_tod,
+            HelperOp::StringToTod,
+            &[
+                (0, "TOD#00:00:00"),
+                (45_296_500_000_000, "TOD#12:34:56.5"),
+                (86_399_999_999_999, "TOD#23:59:59.999999999"),
+                (-1, "TOD#-00:00:00.000000001"),
+                (i64::MAX, "TOD#2562047:47:16.854775807"),
+                (i64::MIN, "TOD#-2562047:47:16.854775808"),
+            ],
+        ),
+        (
+            string_from_dt,
+            HelperOp::StringToDt,
+            &[
+                (0, "DT#1970-01-01-00:00:00"),
+                (-1, "DT#1969-12-31-23:59:59.999999999"),
+                (i64::MAX, "DT#2262-04-11-23:47:16.854775807"),
+                (i64::MIN, "DT#1677-09-21-00:12:43.145224192"),
+            ],
+        ),
+    ];
+    for (from, to, values) in forms {
+        let written = |value: i64| {
+            let mut memory = vec![0; 100];
+            let dst = StringPlace { at: 3, capacity: 90 };
+            from(&mut memory, dst, value);
+            String::from_utf8(characters(&memory, dst)).unwrap()
+        };
+        for (value, text) in values {
+            assert_eq!(written(*value), *text);
+            assert_eq!(from_text(to, text), Value::I64(*value), "{text}");
+            let (_, bare) = text.split_once('#').unwrap();
+            assert_eq!(from_text(to, &format!("{bare}!")), Value::I64(*value), "{text} without its type");
+        }
+        let mut random = Random(6);
+        for _ in 0..5_000 {
+            let value = (random.next() as i64) >> random.below(64);
+            let value =
+                if to == HelperOp::StringToDate { value / 86_400_000_000_000 * 86_400_000_000_000 } else { value };
+            assert_eq!(from_text(to, &written(value)), Value::I64(value), "{}", written(value));
+        }
+    }
+}
+
+#[test]
+fn the_longest_prefix_that_is_a_date_counts() {
+    for (op, text, value) in [
+        (HelperOp::StringToDate, "D#9999-12-31", i64::MAX),
+        (HelperOp::StringToDate, "D#0001-01-01", i64::MIN),
+        (HelperOp::StringToDate, "TOD#1970-01-02", 0),
+        (HelperOp::StringToDate, "2023-02-29", 0),
+        (HelperOp::StringToTod, "99999999999999999999999:00", i64::MAX),
+        (HelperOp::StringToTod, "1:61", 0),
+        (HelperOp::StringToDt, "date_and_time#1970-1-1-0:1", 60_000_000_000),
+        (HelperOp::StringToDt, "DT#1970-01-02", 0),
+    ] {
+        assert_eq!(from_text(op, text), Value::I64(value), "{text}");
+    }
+}

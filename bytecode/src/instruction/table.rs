@@ -194,6 +194,13 @@ macro_rules! for_each_numeric {
         (0x01b1, I64ReinterpretF64, i64_reinterpret_f64, "i64.reinterpret_f64", [F64] -> I64, total, 1, "The bits of an LREAL."),
         (0x01b2, F32ReinterpretI32, f32_reinterpret_i32, "f32.reinterpret_i32", [I32] -> F32, total, 1, "A REAL of these bits; any NaN becomes the one NaN."),
         (0x01b3, F64ReinterpretI64, f64_reinterpret_i64, "f64.reinterpret_i64", [I64] -> F64, total, 1, "An LREAL of these bits; any NaN becomes the one NaN."),
+        (0x01b4, DateStart, date_start, "date.start", [I64] -> I64, total, 2, "Of a moment (nanoseconds since 1970-01-01) the start of its day, wrapped to 64 bits."),
+        (0x01b5, DateTime, date_time, "date.time", [I64] -> I64, total, 2, "Of a moment the nanoseconds since the start of its day: the remainder by a day that is not negative."),
+        (0x01b6, DateYear, date_year, "date.year", [I64] -> I32, total, 8, "Of a moment the year of the Gregorian calendar."),
+        (0x01b7, DateMonth, date_month, "date.month", [I64] -> I32, total, 8, "Of a moment the month, 1 to 12."),
+        (0x01b8, DateDay, date_day, "date.day", [I64] -> I32, total, 8, "Of a moment the day of the month, 1 to 31."),
+        (0x01b9, DateWeekday, date_weekday, "date.weekday", [I64] -> I32, total, 3, "Of a moment the day of the week: 0 Sunday to 6 Saturday."),
+        (0x01ba, DateOf, date_of, "date.of", [I64 I64] -> I64, total, 8, "The start of a day, given the month, counted from January of the year 0, and the day in it; days before and behind the month's count on; exact, then wrapped to 64 bits."),
     } };
 }
 
@@ -228,6 +235,12 @@ macro_rules! for_each_helper {
         (0x0314, StringToF64, string_to_f64, "string.to_f64", [Src] -> F64, 8, "The longest prefix that is a number, rounded to nearest even; 0 without one."),
         (0x0315, StringToBool, string_to_bool, "string.to_bool", [Src] -> I32, 8, "1 only for 'TRUE' in any case."),
         (0x0316, StringToTime, string_to_time, "string.to_time", [Src] -> I64, 8, "The longest prefix that is a TIME literal (with or without T#), in nanoseconds; 0 without one."),
+        (0x0320, StringFromDate, string_from_date, "string.from_date", [Dst I64] -> Nothing, 8, "The day of a moment as a DATE literal, for example D#2024-02-29."),
+        (0x0321, StringFromTod, string_from_tod, "string.from_tod", [Dst I64] -> Nothing, 8, "A TIME_OF_DAY (nanoseconds) as its literal, for example TOD#12:34:56.5; outside a day for example TOD#-00:00:01."),
+        (0x0322, StringFromDt, string_from_dt, "string.from_dt", [Dst I64] -> Nothing, 8, "A moment as a DATE_AND_TIME literal, for example DT#2024-02-29-12:34:56."),
+        (0x0323, StringToDate, string_to_date, "string.to_date", [Src] -> I64, 8, "The longest prefix that is a DATE literal (with or without D#), in nanoseconds since 1970-01-01, saturated; 0 without one."),
+        (0x0324, StringToTod, string_to_tod, "string.to_tod", [Src] -> I64, 8, "The longest prefix that is a TIME_OF_DAY literal (with or without TOD#), in nanoseconds, saturated; 0 without one."),
+        (0x0325, StringToDt, string_to_dt, "string.to_dt", [Src] -> I64, 8, "The longest prefix that is a DATE_AND_TIME literal (with or without DT#), in nanoseconds since 1970-01-01, saturated; 0 without one."),
     } };
 }
 

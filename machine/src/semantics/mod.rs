@@ -4,6 +4,7 @@
 //! Engines inline these functions, call them, or emit code for which these are the model; nobody else defines a meaning.
 //! The dispatchers here are derived from the tables, so a row without its function does not compile.
 
+mod calendar;
 mod control;
 mod convert;
 mod float;
@@ -17,6 +18,7 @@ mod value;
 use khz_bytecode::instruction::{HelperOp, NumericOp};
 use khz_bytecode::trap::TrapCode;
 
+pub use calendar::*;
 pub use control::*;
 pub use convert::*;
 pub use float::*;

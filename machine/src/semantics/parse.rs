@@ -7,9 +7,9 @@ use super::text::{TIME_UNITS, TextBuffer};
 
 /// Reads a text from its start, one byte at a time.
 #[derive(Clone, Copy)]
-struct Cursor<'a> {
-    bytes: &'a [u8],
-    at: usize,
+pub(super) struct Cursor<'a> {
+    pub(super) bytes: &'a [u8],
+    pub(super) at: usize,
 }
 
 impl Cursor<'_> {
@@ -17,14 +17,14 @@ impl Cursor<'_> {
         self.bytes.get(self.at).copied()
     }
 
-    fn take(&mut self, wanted: u8) -> bool {
+    pub(super) fn take(&mut self, wanted: u8) -> bool {
         let found = self.peek() == Some(wanted);
         self.at += usize::from(found);
         found
     }
 
     /// Takes `wanted` in any case, whole or not at all.
-    fn take_word(&mut self, wanted: &str) -> bool {
+    pub(super) fn take_word(&mut self, wanted: &str) -> bool {
         let word = self.bytes.get(self.at..).and_then(|rest| rest.get(..wanted.len()));
         let found = word.is_some_and(|word| word.eq_ignore_ascii_case(wanted.as_bytes()));
         self.at += if found { wanted.len() } else { 0 };
@@ -40,7 +40,7 @@ impl Cursor<'_> {
         negative
     }
 
-    fn digit(&mut self, base: u32) -> Option<u32> {
+    pub(super) fn digit(&mut self, base: u32) -> Option<u32> {
         let digit = self.peek().and_then(|byte| char::from(byte).to_digit(base))?;
         self.at += 1;
         Some(digit)

@@ -9,6 +9,9 @@
 use std::fmt::Write;
 use std::ops::Range;
 
+use super::calendar::{
+    parse_date, parse_date_and_time, parse_time_of_day, write_date, write_date_and_time, write_time_of_day,
+};
 use super::parse::{IntegerText, parse_integer, parse_real, parse_time};
 use super::text::{TextBuffer, write_f32, write_f64, write_time};
 
@@ -284,6 +287,12 @@ from_values! {
     string_from_bool(i32) |out, value| out.write_str(if value != 0 { "TRUE" } else { "FALSE" });
     /// The row `string_from_time`.
     string_from_time(i64) |out, value| write_time(out, "T", value);
+    /// The row `string_from_date`.
+    string_from_date(i64) |out, value| out.write_str("D#").and_then(|()| write_date(out, value));
+    /// The row `string_from_tod`.
+    string_from_tod(i64) |out, value| out.write_str("TOD#").and_then(|()| write_time_of_day(out, value));
+    /// The row `string_from_dt`.
+    string_from_dt(i64) |out, value| out.write_str("DT#").and_then(|()| write_date_and_time(out, value));
 }
 
 /// The row `string_to_i64`.
@@ -319,6 +328,28 @@ pub fn string_to_bool(memory: &[u8], src: StringPlace) -> i32 {
 /// The row `string_to_time`.
 #[must_use]
 pub fn string_to_time(memory: &[u8], src: StringPlace) -> i64 {
-    parse_time(src.text(memory))
-        .map_or(0, |(duration_ns, _)| duration_ns.clamp(i128::from(i64::MIN), i128::from(i64::MAX)) as i64)
+    saturated(parse_time(src.text(memory)))
+}
+
+/// The row `string_to_date`.
+#[must_use]
+pub fn string_to_date(memory: &[u8], src: StringPlace) -> i64 {
+    saturated(parse_date(src.text(memory)))
+}
+
+/// The row `string_to_tod`.
+#[must_use]
+pub fn string_to_tod(memory: &[u8], src: StringPlace) -> i64 {
+    saturated(parse_time_of_day(src.text(memory)))
+}
+
+/// The row `string_to_dt`.
+#[must_use]
+pub fn string_to_dt(memory: &[u8], src: StringPlace) -> i64 {
+    saturated(parse_date_and_time(src.text(memory)))
+}
+
+/// Nanoseconds out of a text in 64 bits; 0 without any.
+fn saturated(parsed: Option<(i128, usize)>) -> i64 {
+    parsed.map_or(0, |(value_ns, _)| value_ns.clamp(i128::from(i64::MIN), i128::from(i64::MAX)) as i64)
 }

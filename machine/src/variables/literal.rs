@@ -2,10 +2,9 @@
 
 use khz_bytecode::container::ElementaryType;
 
-use super::calendar::{parse_date, parse_date_and_time, parse_time_of_day};
 use super::scalar::{VariableValue, time_prefix};
-use crate::semantics::Value;
 use crate::semantics::parse::{parse_integer, parse_real, parse_time};
+use crate::semantics::{Value, parse_date, parse_date_and_time, parse_time_of_day};
 
 /// Why a text is no value of a type, in words that follow "`x` is INT: ".
 pub(super) type Reason = String;
@@ -99,20 +98,16 @@ fn parse_moment(ty: ElementaryType, literal: &str) -> Result<Value, Reason> {
         let duration_ns = i64::try_from(duration_ns).map_err(|_| format!("{literal} is beyond 292 years"))?;
         return Ok(Value::I64(duration_ns));
     }
-    let (names, example): (&[&str], _) = match ty {
-        E::Date | E::Ldate => (&["D", "DATE", "LD", "LDATE"], "D#2024-02-29"),
-        E::TimeOfDay | E::LtimeOfDay => (&["TOD", "TIME_OF_DAY", "LTOD", "LTIME_OF_DAY"], "TOD#12:34:56"),
-        _ => (&["DT", "DATE_AND_TIME", "LDT", "LDATE_AND_TIME"], "DT#2024-02-29-12:34:56"),
+    let bytes = literal.as_bytes();
+    let (parsed, example) = match ty {
+        E::Date | E::Ldate => (parse_date(bytes), "D#2024-02-29"),
+        E::TimeOfDay | E::LtimeOfDay => (parse_time_of_day(bytes), "TOD#12:34:56"),
+        _ => (parse_date_and_time(bytes), "DT#2024-02-29-12:34:56"),
     };
-    let (prefix, rest) = literal.split_once('#').unwrap_or((names[0], literal));
-    let parsed = match ty {
-        E::Date | E::Ldate => parse_date(rest),
-        E::TimeOfDay | E::LtimeOfDay => parse_time_of_day(rest),
-        _ => parse_date_and_time(rest),
-    };
-    let is_known = names.iter().any(|name| prefix.eq_ignore_ascii_case(name));
-    let wrong = || format!("`{literal}` is not such a moment, for example {example}");
-    parsed.filter(|_| is_known).map(Value::I64).ok_or_else(wrong)
+    let moment_ns = parsed.filter(|(_, used)| *used == literal.len()).map(|(moment_ns, _)| moment_ns);
+    let moment_ns = moment_ns.ok_or_else(|| format!("`{literal}` is not such a moment, for example {example}"))?;
+    let moment_ns = i64::try_from(moment_ns).map_err(|_| format!("{literal} is beyond 292 years from 1970"))?;
+    Ok(Value::I64(moment_ns))
 }
 
 fn single(units: &[u16]) -> Result<Value, Reason> {

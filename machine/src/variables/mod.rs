@@ -7,7 +7,6 @@
 //! A [`Variable`] is resolved once and used often: resolving allocates, reading and writing scalars through it does not search.
 
 mod address;
-mod calendar;
 mod dump;
 mod literal;
 mod raw;

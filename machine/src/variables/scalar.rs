@@ -4,9 +4,8 @@ use std::fmt::Write;
 
 use khz_bytecode::container::ElementaryType;
 
-use super::calendar::{DAY_NS, write_date, write_time_of_day};
 use crate::json;
-use crate::semantics::{Value, write_f32, write_f64, write_time};
+use crate::semantics::{Value, write_date, write_date_and_time, write_f32, write_f64, write_time, write_time_of_day};
 
 /// A value that is no array or structure.
 #[derive(Debug, Clone, PartialEq)]
@@ -122,11 +121,7 @@ fn write_moment(out: &mut String, ty: ElementaryType, value_ns: i64) -> std::fmt
     match ty {
         E::TimeOfDay | E::LtimeOfDay => write_time_of_day(out, value_ns),
         E::Date | E::Ldate => write_date(out, value_ns),
-        _ => {
-            write_date(out, value_ns)?;
-            out.push('-');
-            write_time_of_day(out, value_ns.rem_euclid(DAY_NS))
-        }
+        _ => write_date_and_time(out, value_ns),
     }
 }
 

@@ -4,6 +4,7 @@
 //! types. Its only aim is that a reader can hold it against the document. Where the verifier's promise is broken (a wrong type on the
 //! stack, an access outside the image, a control variable that was proven to be kept and is not), it panics: that is a finding in the verifier, and the panic is its report.
 
+mod calendar;
 mod numeric;
 mod step;
 mod strings;

@@ -1,6 +1,7 @@
 //! The numeric rows, from their sentences in `docs/instructions.md`: integers by exact arithmetic in 128 bits that is cut afterwards, floating
 //! point by value with the one NaN put in by hand.
 
+use super::calendar;
 use khz_bytecode::instruction::NumericOp;
 use khz_bytecode::trap::TrapCode;
 use khz_bytecode::value::ValueType;
@@ -15,6 +16,10 @@ pub(super) fn compute(op: NumericOp, operands: &[Value]) -> Result<Value, TrapCo
     assert!(fits, "{} on {operands:?}", op.mnemonic());
     let (prefix, name) = op.mnemonic().split_once('.').unwrap_or_default();
     let bits = match (prefix, op.operands().first(), op.operands().last()) {
+        ("date", ..) => {
+            let number = |at: usize| operands.get(at).map_or(0, |operand| signed(u128::from(operand.bits()), 64));
+            calendar::compute(name, number(0), number(1)) as u128
+        }
         ("f32" | "f64", Some(ValueType::F32), Some(ValueType::F32)) if is_plain(name) => float32(name, operands),
         ("f32" | "f64", Some(ValueType::F64), Some(ValueType::F64)) if is_plain(name) => float64(name, operands),
         (_, Some(from), _) if !is_plain(name) => convert(prefix, name, *from, operands[0]),
