@@ -1,5 +1,5 @@
 //! One slip in a program: what refuses it says so at a place, and says little. A fixed sample of what
-//! `cargo run --release -p khz-frontend --example mutants` does with all conformance programs.
+//! `cargo run --release -p khz-frontend --example spoiled_programs` does with all conformance programs.
 
 #[path = "support/mutants.rs"]
 mod mutants;

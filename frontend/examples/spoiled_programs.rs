@@ -1,9 +1,9 @@
 //! Every program below a folder × every token × (deleted, doubled, swapped): how many diagnostics one slip causes.
 //!
 //! ```sh
-//! cargo run --release -p khz-frontend --example mutants -- tests/conformance      # all of it
-//! cargo run --release -p khz-frontend --example mutants -- tests/conformance 5    # and mutants with 5 or more, one in 50
-//! cargo run --release -p khz-frontend --example mutants -- tests/conformance 99 7 # every seventh mutant
+//! cargo run --release -p khz-frontend --example spoiled_programs -- tests/conformance      # all of it
+//! cargo run --release -p khz-frontend --example spoiled_programs -- tests/conformance 5    # and mutants with 5 or more, one in 50
+//! cargo run --release -p khz-frontend --example spoiled_programs -- tests/conformance 99 7 # every seventh mutant
 //! ```
 
 #![allow(clippy::print_stdout, reason = "an example prints")]
