@@ -137,3 +137,18 @@ fn code_that_instances_share_is_cut_too() {
     assert!(form(&text, 60).contains("part 2(") && lines(&form(&text, 60)).len() > 4, "{}", form(&text, 60));
     assert_eq!(outcome(&text, 60), outcome(&text, 1 << 20));
 }
+
+#[test]
+fn what_only_one_turn_assigns_in_a_part_is_still_there_after_the_loop() {
+    let turn = "slot.load g a\nconst.i32 6\ni32.eq\njump.unless later\nslot.load g a\nslot.store l m\nlater:\n";
+    let text = program(&format!(
+        "const.i32 0\nslot.store g a\ntop:\n{}{turn}{}slot.load g a\nconst.i32 200\ni32.lt_s\njump.if top\nslot.load l m\nslot.store g b\n",
+        statements(6),
+        statements(6).replace("over", "under")
+    ));
+    let text = text.replace("local n i32\n", "local n i32\nlocal m i32\n");
+    assert_eq!(outcome(&text, 1 << 20)[1], 6);
+    for items in [4, 12, 30] {
+        assert_eq!(outcome(&text, items), outcome(&text, 1 << 20), "{items}");
+    }
+}
