@@ -151,3 +151,36 @@ fn of_changed_sources_none_panics_and_what_compiles_verifies() {
     }
     assert!(compiled_count > 30, "only {compiled_count} changed sources still compile: the test tests little");
 }
+
+/// `levels` functions, each of which calls the next one twice, with one array of its own in place of one that came: the last one is called
+/// with 2 to the power of `levels - 1` combinations.
+fn doubling(levels: usize) -> String {
+    let names: Vec<String> = (0..levels).map(|at| format!("p{at}")).collect();
+    let mut text = String::new();
+    for level in 0..levels {
+        let parameters = format!("VAR_IN_OUT {} : ARRAY[*] OF INT; END_VAR\n", names.join(", "));
+        let mut other = names.clone();
+        other[level] = "own".to_owned();
+        let (same, other) = (names.join(", "), other.join(", "));
+        let body = if level + 1 == levels {
+            format!("f{level} := UPPER_BOUND(p0, 1);")
+        } else {
+            let next = level + 1;
+            format!("f{level} := f{next}({same}) + f{next}({other});")
+        };
+        let own = format!("VAR own : ARRAY[1..{}] OF INT; END_VAR\n", level + 100);
+        text += &format!("FUNCTION f{level} : DINT\n{parameters}{own}  {body}\nEND_FUNCTION\n");
+    }
+    let whole = vec!["a"; levels].join(", ");
+    text + &format!("PROGRAM main\nVAR a : ARRAY[1..2] OF INT; n : DINT; END_VAR\n  n := f0({whole});\nEND_PROGRAM\n")
+}
+
+#[test]
+fn open_arrays_give_one_function_for_each_combination_up_to_a_limit() {
+    let [container] = &verified(&doubling(6))[..] else { panic!("one resource") };
+    // The program and 1 + 2 + 4 + 8 + 16 + 32 functions.
+    assert_eq!(container.functions.len(), 64);
+    let found = compiled(&doubling(16));
+    assert_eq!(found.diagnostics.iter().filter(|found| found.is_error()).count(), 1);
+    assert!(found.diagnostics.iter().any(|found| found.code() == semantic::LIMIT.code), "{}", messages(&found));
+}

@@ -278,6 +278,7 @@ impl<'a> Checker<'_, 'a> {
         let mut sound = true;
         let mut inputs = Vec::new();
         let mut inouts = Vec::new();
+        let mut arrays = Vec::new();
         for (id, var) in (0u32..).map(VarId).zip(&info.vars) {
             let given = bound.inputs.iter().find(|(other, _)| *other == id).map(|(_, value)| *value);
             match var.class {
@@ -289,14 +290,24 @@ impl<'a> Checker<'_, 'a> {
                     Some(value) => {
                         self.note_parameter((pou, id), &value);
                         sound &= value.ty != Ty::Error;
+                        arrays.extend(self.is_open(var.ty).then_some((id, value.ty)));
                         inputs.push((id, value));
                     }
                     None => sound = false,
                 },
                 VarClass::InOut => match self.inout(pou, id, var, given, span) {
-                    Some(place) => inouts.push((id, place)),
+                    Some(place) => {
+                        arrays.extend(self.is_open(var.ty).then_some((id, place.ty)));
+                        inouts.push((id, place));
+                    }
                     None => sound = false,
                 },
+                VarClass::Output if self.is_open(var.ty) && !bound.outputs.iter().any(|(other, ..)| *other == id) => {
+                    let message =
+                        format!("the output `{}` has the bounds of its variable, so it must be connected", var.name);
+                    self.an.report(&names::ARGUMENT_COUNT, span, message);
+                    sound = false;
+                }
                 _ => {}
             }
         }
@@ -306,6 +317,16 @@ impl<'a> Checker<'_, 'a> {
             ty: var.ty,
             span,
         });
+        for statement in &after {
+            if let StmtKind::Assign { target, value } = &statement.kind
+                && let ExprKind::Load(from) = &value.kind
+                && let Root::CallOutput(id) = from.root
+                && info.vars.get(id.0 as usize).is_some_and(|var| self.is_open(var.ty))
+            {
+                arrays.push((id, target.ty));
+            }
+        }
+        sound &= info.vars.iter().filter(|var| self.is_open(var.ty)).count() == arrays.len();
         let eno = bound.eno.and_then(|(eno, _)| self.eno(eno));
         let eno_is_given = bound.declares_eno;
         let before = Vec::new();
@@ -319,15 +340,21 @@ impl<'a> Checker<'_, 'a> {
             before,
             inouts,
             after,
+            arrays: Self::in_order(arrays),
             span,
         })
     }
 
     fn input_value(&mut self, var: &VarInfo, given: Option<&'a ast::Expr>, span: Span) -> Option<Expr> {
         if let Some(given) = given {
+            if self.is_open(var.ty) {
+                let found = self.expr(given, Ty::Void);
+                return (found.ty != Ty::Error && self.stands_for(var, found.ty, given.span)).then_some(found);
+            }
             return Some(self.expr_of(given, var.ty));
         }
         let value = match &var.init {
+            _ if self.is_open(var.ty) => None,
             Value::Scalar(value) => Some(value.clone()),
             Value::Zero => self.zero(var.ty),
             _ => None,
@@ -385,7 +412,11 @@ impl<'a> Checker<'_, 'a> {
             self.an.report(&names::IN_OUT, given.span, message);
             return None;
         }
-        if place.ty != var.ty && var.ty != Ty::Error {
+        if self.is_open(var.ty) {
+            if !self.stands_for(var, place.ty, given.span) {
+                return None;
+            }
+        } else if place.ty != var.ty && var.ty != Ty::Error {
             let (wanted, found) = (self.an.types.name(var.ty), self.an.types.name(place.ty));
             let message =
                 format!("`{}` is a VAR_IN_OUT of {wanted}; a variable of {found} can not stand in for it", var.name);
@@ -420,6 +451,12 @@ impl<'a> Checker<'_, 'a> {
             let Some(target) = self.target(target) else { continue };
             let mut from = source(*id, var);
             from.span = target.span;
+            if self.is_open(var.ty) {
+                if !self.stands_for(var, target.ty, target.span) {
+                    continue;
+                }
+                from.ty = target.ty;
+            }
             let (ty, span) = (from.ty, target.span);
             let mut value = Expr { kind: ExprKind::Load(Box::new(from)), ty, span };
             if *negated {
@@ -468,11 +505,14 @@ impl<'a> Checker<'_, 'a> {
                 before.extend(field(var, span).map(assign));
             }
         }
-        let mut inouts = Vec::new();
+        let (mut inouts, mut arrays) = (Vec::new(), Vec::new());
         for (id, var) in (0u32..).map(VarId).zip(&info.vars).filter(|(_, var)| var.class == VarClass::InOut) {
             let given = bound.inputs.iter().find(|(other, _)| *other == id).map(|(_, value)| *value);
             match self.inout(pou, id, var, given, span) {
-                Some(place) => inouts.push((id, place)),
+                Some(place) => {
+                    arrays.extend(self.is_open(var.ty).then_some((id, place.ty)));
+                    inouts.push((id, place));
+                }
                 None => sound = false,
             }
         }
@@ -483,6 +523,18 @@ impl<'a> Checker<'_, 'a> {
         let eno = bound.eno.and_then(|(eno, _)| self.eno(eno));
         let (instance, eno_is_given) = (Some(instance), bound.declares_eno);
         let inputs = Vec::new();
-        sound.then_some(Call { target: pou, instance, en, eno, eno_is_given, inputs, before, inouts, after, span })
+        sound.then_some(Call {
+            target: pou,
+            instance,
+            en,
+            eno,
+            eno_is_given,
+            inputs,
+            before,
+            inouts,
+            after,
+            arrays,
+            span,
+        })
     }
 }

@@ -337,8 +337,9 @@ impl<'a> Analyzer<'a> {
             if name.is_missing() {
                 continue;
             }
-            let (ty, init) = match vars.last() {
-                Some(last) if at > 0 && !constant => (last.ty, last.init.clone()),
+            let (ty, init) = match (self.open_array(&decl.ty, pou.kind, class, Some(id)), vars.last()) {
+                (Some(ty), _) => (ty, Value::Zero),
+                (None, Some(last)) if at > 0 && !constant => (last.ty, last.init.clone()),
                 _ => self.declared_value(decl, name.symbol, Some(id), constant),
             };
             if pou.kind == PouKind::Function && !matches!(class, VarClass::InOut | VarClass::External) {

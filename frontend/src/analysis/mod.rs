@@ -18,6 +18,7 @@ mod declare;
 mod expr;
 mod fold;
 mod init;
+mod open;
 mod place;
 mod reach;
 mod spec;

@@ -278,8 +278,13 @@ impl<'a> Checker<'_, 'a> {
     }
 
     fn element(&mut self, base: Place, indices: &'a [ast::Expr], span: Span) -> Option<Place> {
-        let (Ty::User(owner), Some(TyKind::Array { element, dims })) = (base.ty, self.an.types.kind(base.ty).cloned())
-        else {
+        // The bounds of an open array are known at its call.
+        let kind = match self.an.types.kind(base.ty).cloned() {
+            Some(TyKind::Open { element, dims }) => Some((element, vec![(i32::MIN, i32::MAX); dims].into())),
+            Some(TyKind::Array { element, dims }) => Some((element, dims)),
+            _ => None,
+        };
+        let (Ty::User(owner), Some((element, dims))) = (base.ty, kind) else {
             let message = format!("{} is no array", self.an.types.name(base.ty));
             self.an.report(&rules::NOT_AN_ARRAY, span, message);
             return None;

@@ -260,7 +260,13 @@ impl<'a> Analyzer<'a> {
         Ty::User(id)
     }
 
-    fn array_type(&mut self, dims: &'a [ArrayDim], element: &'a TypeSpec, scope: Option<PouId>, span: Span) -> Ty {
+    pub(super) fn array_type(
+        &mut self,
+        dims: &'a [ArrayDim],
+        element: &'a TypeSpec,
+        scope: Option<PouId>,
+        span: Span,
+    ) -> Ty {
         let (element_ty, element_default) = self.resolve_spec(element, scope);
         let mut bounds = Vec::with_capacity(dims.len());
         let mut sound = element_ty != Ty::Error;
@@ -271,7 +277,7 @@ impl<'a> Analyzer<'a> {
         for dim in dims {
             match dim {
                 ArrayDim::Open(at) => {
-                    self.not_yet(*at, "an array of open bounds");
+                    self.open_array_not_here(*at);
                     sound = false;
                 }
                 ArrayDim::Range(range) => match self.range(range, scope) {

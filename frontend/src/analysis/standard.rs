@@ -6,7 +6,7 @@ use khz_machine::library::functions::{self, FunctionRow, ResultRule, StandardFun
 use super::expr::{Checker, broken};
 use super::testing::is_test_word;
 use super::tree::{BinOp, Expr, ExprKind, TextOp, UnOp};
-use super::types::{BOOL, Const, DINT, INT, Ty, elementary_by_name, is_bits, is_duration, is_integer, is_real};
+use super::types::{BOOL, Const, DINT, INT, Ty, TyKind, elementary_by_name, is_bits, is_duration, is_integer, is_real};
 use crate::diagnostics::{Diagnostic, semantic as names, types as rules};
 use crate::source::Span;
 use crate::syntax::ast::{self, Arg, ArgKind, Ident};
@@ -152,6 +152,9 @@ impl<'a> Checker<'_, 'a> {
             (TypeClass::AnyElementary, _) => elementary.is_some(),
             (TypeClass::AnyString, ty) => matches!(ty, Ty::Str(_)),
             (TypeClass::Bool, ty) => ty == BOOL,
+            (TypeClass::Array, ty) => {
+                matches!(self.an.types.kind(ty), Some(TyKind::Array { .. } | TyKind::Open { .. }))
+            }
             (_, Ty::IntLit) => true,
             (TypeClass::AnyMagnitude | TypeClass::AnyNum | TypeClass::AnyReal, Ty::RealLit) => true,
             _ if is_enum => false,
@@ -223,6 +226,10 @@ impl<'a> Checker<'_, 'a> {
             }
             F::Move => values.pop().map_or_else(|| broken(span), |value| self.settle(value, want)),
             F::Shl | F::Shr | F::Rol | F::Ror => self.shift(row.function, values, span, want),
+            F::LowerBound | F::UpperBound => match values.as_slice() {
+                [array, dim] => self.array_bound(array, dim, row.function == F::UpperBound, span),
+                _ => broken(span),
+            },
             F::Sel | F::Mux => self.selection(row.function, values, span, want),
             _ => self.text_call(row.function, values, span),
         }

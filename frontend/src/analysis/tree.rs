@@ -436,6 +436,8 @@ pub enum ExprKind {
     Kept,
     /// A string operation on strings and DINT numbers.
     Text(TextOp, Vec<Expr>),
+    /// A bound of the array that stands for an open one ([`TyKind::Open`](super::types::TyKind)): dimension from 0, upper or lower.
+    Bound(TyId, usize, bool),
 }
 
 /// Operators with one operand.
@@ -563,6 +565,8 @@ pub struct Call {
     pub inouts: Vec<(VarId, Place)>,
     /// Assignments from its outputs.
     pub after: Vec<Rc<Stmt>>,
+    /// The arrays that stand for open ones, by parameter in order of declaration.
+    pub arrays: Vec<(VarId, Ty)>,
     /// Where it stands.
     pub span: Span,
 }

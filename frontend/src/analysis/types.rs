@@ -118,6 +118,13 @@ pub enum TyKind {
         /// Bounds of each dimension.
         dims: Rc<[(i32, i32)]>,
     },
+    /// A parameter's array whose bounds come with the argument; each such parameter has a type of its own.
+    Open {
+        /// Type of an element.
+        element: Ty,
+        /// Number of dimensions.
+        dims: usize,
+    },
     /// A structure.
     Struct {
         /// Its fields.

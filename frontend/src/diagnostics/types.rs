@@ -81,6 +81,11 @@ rules! {
         wrong "TYPE\n  U : UNION\n    level : INT (0..100);\n    raw : WORD;\n  END_UNION;\nEND_TYPE\nPROGRAM p\nVAR\n  u : U;\nEND_VAR\n  u.raw := 16#FFFF;\nEND_PROGRAM\n"
         right "TYPE\n  U : UNION\n    level : INT;\n    raw : WORD;\n  END_UNION;\nEND_TYPE\nPROGRAM p\nVAR\n  u : U;\nEND_VAR\n  u.raw := 16#FFFF;\nEND_PROGRAM\n"
     }
+    OPEN_ARRAY = "T0016" Error "an array without bounds" {
+        "`ARRAY[*]` takes its bounds from the argument of the call. It stands as VAR_INPUT, VAR_OUTPUT or VAR_IN_OUT of a function and as VAR_IN_OUT of a function block; every other array says its bounds. LOWER_BOUND and UPPER_BOUND tell them."
+        wrong "PROGRAM p\nVAR\n  a : ARRAY[*] OF INT;\nEND_VAR\nEND_PROGRAM\n"
+        right "FUNCTION clear\nVAR_IN_OUT\n  a : ARRAY[*] OF INT;\nEND_VAR\n  a[LOWER_BOUND(a, 1)] := 0;\nEND_FUNCTION\nPROGRAM p\nVAR\n  a : ARRAY[1..9] OF INT;\nEND_VAR\n  clear(a);\nEND_PROGRAM\n"
+    }
     NARROWED = "T0101" Warning "narrowed" {
         "The wider value keeps only its low bits. Say that it is meant: DINT_TO_INT(x). Under `--dialect iec` this is an error."
         wrong "PROGRAM p\nVAR\n  a : INT;\n  b : DINT;\nEND_VAR\n  a := b;\nEND_PROGRAM\n"

@@ -42,7 +42,7 @@ fn own_expressions<'a>(statement: &'a Stmt, visit: &mut dyn FnMut(&'a Expr)) {
 fn in_expr<'a>(expr: &'a Expr, visit: &mut dyn FnMut(&'a Expr)) {
     visit(expr);
     match &expr.kind {
-        ExprKind::Const(_) | ExprKind::Kept => {}
+        ExprKind::Const(_) | ExprKind::Kept | ExprKind::Bound(..) => {}
         ExprKind::Load(place) => in_place(place, visit),
         ExprKind::Unary(_, value) | ExprKind::Convert { value, .. } => in_expr(value, visit),
         ExprKind::ToIndex(value) | ExprKind::Check(value, ..) | ExprKind::Keep(value) => in_expr(value, visit),

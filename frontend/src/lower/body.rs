@@ -105,6 +105,7 @@ impl<'b, 'p> FunctionBuilder<'b, 'p> {
 
     /// Room in the frame.
     pub(super) fn frame_room(&mut self, ty: Ty) -> u32 {
+        let ty = self.b.actual(ty);
         let (size, align) = self.b.project.types.extent(ty);
         let id = self.b.type_id(ty);
         let offset = self.frame_size.next_multiple_of(align.max(1));
@@ -120,6 +121,7 @@ impl<'b, 'p> FunctionBuilder<'b, 'p> {
 
     /// Room in the frame until the statement ends.
     pub(super) fn temporary(&mut self, ty: Ty) -> u32 {
+        let ty = self.b.actual(ty);
         let offset = match self.free_temporaries.get_mut(&ty).and_then(Vec::pop) {
             Some(offset) => offset,
             None => self.frame_room(ty),

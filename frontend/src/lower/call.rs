@@ -68,7 +68,7 @@ impl FunctionBuilder<'_, '_> {
 
     /// Calls a function. Leaves its result: `None` when it has none.
     fn function_call(&mut self, call: &Call) -> Option<Ty> {
-        let info = self.b.info(call.target)?;
+        let info = self.b.called_info(call)?;
         let mut outputs: Vec<(VarId, Home)> = Vec::new();
         let mut count = 0;
         for (id, var) in (0u32..).map(VarId).zip(&info.vars) {
@@ -98,7 +98,7 @@ impl FunctionBuilder<'_, '_> {
             }
         }
         self.e.mark(call.span);
-        let function = self.b.function_id(call.target);
+        let function = self.b.called(call);
         let results: Vec<(VarId, Ty)> =
             result_vars(&info).filter(|(_, ty)| self.b.project.types.storage(*ty).is_some()).collect();
         let pushes = u32::try_from(results.len()).unwrap_or(0);
@@ -164,7 +164,7 @@ impl FunctionBuilder<'_, '_> {
             count += 1;
         }
         self.e.mark(call.span);
-        let function = self.b.function_id(call.target);
+        let function = self.b.called(call);
         self.e.push(I::Call { function }, count, 0);
         for statement in &call.after {
             self.statement(statement);
@@ -178,7 +178,7 @@ impl FunctionBuilder<'_, '_> {
 
     /// A composed value or string as an argument of exactly a type.
     fn composed_as(&mut self, value: &Expr, ty: Ty) {
-        if value.ty == ty {
+        if self.b.actual(value.ty) == ty {
             self.composed(value);
             return;
         }

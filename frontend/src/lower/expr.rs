@@ -9,7 +9,7 @@ use super::body::{FunctionBuilder, Kept};
 use super::ops;
 use crate::analysis::NS_PER_MS;
 use crate::analysis::tree::{BinOp, Expr, ExprKind, TextOp, UnOp};
-use crate::analysis::types::{Const, Ty, integer_type, is_duration, is_real, is_signed, limits};
+use crate::analysis::types::{Const, Ty, TyKind, integer_type, is_duration, is_real, is_signed, limits};
 
 impl FunctionBuilder<'_, '_> {
     pub(super) fn elementary(&self, ty: Ty) -> E {
@@ -109,6 +109,14 @@ impl FunctionBuilder<'_, '_> {
                 }
             }
             ExprKind::Text(op, parts) => self.text_scalar(*op, parts, ty),
+            ExprKind::Bound(array, dim, upper) => {
+                let bounds = match self.b.project.types.kind(self.b.actual(Ty::User(*array))) {
+                    Some(TyKind::Array { dims, .. }) => dims.get(*dim).copied(),
+                    _ => None,
+                };
+                let (lower, highest) = bounds.unwrap_or_default();
+                self.i32_const(if *upper { highest } else { lower });
+            }
         }
     }
 

@@ -36,6 +36,7 @@ impl Builder<'_> {
 
     /// The container's type of a type.
     pub(super) fn type_id(&mut self, ty: Ty) -> TypeId {
+        let ty = self.actual(ty);
         if let Some(storage) = self.project.types.storage(ty) {
             return self.scalar_type(storage);
         }

@@ -13,6 +13,7 @@ mod emit;
 mod expr;
 mod layout;
 mod memory;
+mod open;
 mod ops;
 mod place;
 mod resource;
@@ -82,6 +83,7 @@ struct Builder<'p> {
     longest_string: u16,
     functions: Vec<Function>,
     function_ids: BTreeMap<PouId, FunctionId>,
+    open: open::Instances,
     function_names: Vec<String>,
     marks: Vec<(FunctionId, Vec<(u32, Span)>)>,
     costs: Vec<FunctionCost>,
@@ -156,6 +158,7 @@ impl<'p> Builder<'p> {
             longest_string: 0,
             functions: Vec::new(),
             function_ids: BTreeMap::new(),
+            open: open::Instances::default(),
             function_names: Vec::new(),
             marks: Vec::new(),
             costs: Vec::new(),

@@ -52,11 +52,11 @@ impl FunctionBuilder<'_, '_> {
     }
 
     fn root_type(&self, place: &Place) -> Ty {
-        match place.path.first() {
+        self.b.actual(match place.path.first() {
             Some(Step::Field(owner, _) | Step::Index(owner, _)) => Ty::User(*owner),
             Some(Step::Part(ty, ..)) => *ty,
             None => place.ty,
-        }
+        })
     }
 
     /// The offset of a constant index list in its array.
@@ -66,6 +66,10 @@ impl FunctionBuilder<'_, '_> {
         let mut number: i64 = 0;
         for (index, (low, high)) in indices.iter().zip(dims.iter()) {
             let ExprKind::Const(Const::Int(value)) = index.kind else { return None };
+            // A constant index of an open array was checked against no bounds yet.
+            if value < i64::from(*low) || value > i64::from(*high) {
+                return None;
+            }
             number = number * (i64::from(*high) - i64::from(*low) + 1) + (value - i64::from(*low));
         }
         u32::try_from(number * stride).ok()
@@ -105,7 +109,7 @@ impl FunctionBuilder<'_, '_> {
                     ty = field_ty;
                 }
                 Step::Index(owner, indices) => {
-                    let array = Ty::User(*owner);
+                    let array = self.b.actual(Ty::User(*owner));
                     match (at, self.constant_offset(array, indices)) {
                         (Some((bytes, base)), Some(offset)) => at = Some((bytes, base.saturating_add(offset))),
                         _ => {

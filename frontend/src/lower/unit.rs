@@ -7,6 +7,7 @@ use khz_bytecode::value::{BytePlace, LocalType, RefType, SlotPlace, Storage};
 
 use super::body::FunctionBuilder;
 use super::call::result_vars;
+use super::open::has_open;
 use super::place::Home;
 use super::{Builder, FunctionCost};
 use crate::analysis::tree::{InstancePlan, PouId, PouInfo, VarClass, VarId, VarInfo};
@@ -18,15 +19,18 @@ impl<'p> Builder<'p> {
     /// All units that the resource reaches.
     pub(super) fn lower_units(&mut self) {
         let plan = self.plan;
-        for (at, (pou, _)) in plan.bodies.iter().enumerate() {
-            let id = FunctionId(self.id16(at, "functions"));
-            self.function_ids.insert(*pou, id);
+        for (pou, _) in &plan.bodies {
+            if self.info(*pou).is_some_and(|info| !has_open(self, &info)) {
+                let id = FunctionId(self.id16(self.function_ids.len(), "functions"));
+                self.function_ids.insert(*pou, id);
+            }
         }
         for (pou, body) in &plan.bodies {
-            let Some(info) = self.info(*pou) else { continue };
+            let Some(info) = self.info(*pou).filter(|_| self.function_ids.contains_key(pou)) else { continue };
             let (function, marks, cost) = self.lower_unit(*pou, &info, &body.statements);
             self.add_function(info.name.clone(), function, marks, cost);
         }
+        self.lower_instances();
     }
 
     pub(super) fn add_function(
@@ -54,7 +58,7 @@ impl<'p> Builder<'p> {
         }
     }
 
-    fn lower_unit(
+    pub(super) fn lower_unit(
         &mut self,
         pou: PouId,
         info: &PouInfo,

@@ -26,13 +26,15 @@ pub enum TypeClass {
     Bool,
     /// An integer that is no part of the generic group: a count, a position, a selector.
     Count,
+    /// A whole array.
+    Array,
 }
 
 impl TypeClass {
     /// Whether all parameters of such classes are brought to one common type.
     #[must_use]
     pub fn is_generic(self) -> bool {
-        !matches!(self, TypeClass::Bool | TypeClass::Count | TypeClass::AnyString)
+        !matches!(self, TypeClass::Bool | TypeClass::Count | TypeClass::AnyString | TypeClass::Array)
     }
 
     /// How messages call it.
@@ -49,6 +51,7 @@ impl TypeClass {
             TypeClass::AnyString => "a STRING",
             TypeClass::Bool => "a BOOL",
             TypeClass::Count => "an integer",
+            TypeClass::Array => "an array",
         }
     }
 }
@@ -62,6 +65,8 @@ pub enum ResultRule {
     Bool,
     /// INT.
     Int,
+    /// DINT.
+    Dint,
     /// A STRING that is long enough for every outcome.
     String,
     /// The integer type that the place of the call wants, DINT where it wants none.
@@ -165,6 +170,8 @@ functions! {
     (Insert "INSERT" ["IN1" AnyString, "IN2" AnyString, "P" Count] -> String, "IN2 put into IN1 after position P.", "table 34"),
     (Delete "DELETE" ["IN" AnyString, "L" Count, "P" Count] -> String, "IN without L characters from position P.", "table 34"),
     (Replace "REPLACE" ["IN1" AnyString, "IN2" AnyString, "L" Count, "P" Count] -> String, "IN1 with L characters from position P replaced by IN2.", "table 34"),
+    (LowerBound "LOWER_BOUND" ["ARR" Array, "DIM" Count] -> Dint, "The lowest index of dimension DIM, counted from 1.", "table 15"),
+    (UpperBound "UPPER_BOUND" ["ARR" Array, "DIM" Count] -> Dint, "The highest index of dimension DIM, counted from 1.", "table 15"),
     (Find "FIND" ["IN1" AnyString, "IN2" AnyString] -> Int, "Position of IN2 in IN1, 0 if it is not there.", "table 34"),
 }
 

@@ -17,7 +17,7 @@ fn takes(class: TypeClass, kind: Kind) -> bool {
         TypeClass::AnyInt | TypeClass::Shiftable | TypeClass::Count => kind.is_integer() || kind.is_bits(),
         TypeClass::AnyBit => kind == Kind::Bool || kind.is_integer() || kind.is_bits(),
         TypeClass::Bool => kind == Kind::Bool,
-        TypeClass::AnyString => false,
+        TypeClass::AnyString | TypeClass::Array => false,
     }
 }
 
@@ -34,7 +34,7 @@ fn gives(row: &FunctionRow, kind: Kind) -> bool {
             }
         }
         // What it gives hangs on the place: see `conversion`.
-        ResultRule::WantedInteger | ResultRule::String => false,
+        ResultRule::WantedInteger | ResultRule::String | ResultRule::Dint => false,
     }
 }
 
