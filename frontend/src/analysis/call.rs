@@ -317,15 +317,7 @@ impl<'a> Checker<'_, 'a> {
             ty: var.ty,
             span,
         });
-        for statement in &after {
-            if let StmtKind::Assign { target, value } = &statement.kind
-                && let ExprKind::Load(from) = &value.kind
-                && let Root::CallOutput(id) = from.root
-                && info.vars.get(id.0 as usize).is_some_and(|var| self.is_open(var.ty))
-            {
-                arrays.push((id, target.ty));
-            }
-        }
+        self.output_arrays(&info, &after, &mut arrays);
         sound &= info.vars.iter().filter(|var| self.is_open(var.ty)).count() == arrays.len();
         let eno = bound.eno.and_then(|(eno, _)| self.eno(eno));
         let eno_is_given = bound.declares_eno;

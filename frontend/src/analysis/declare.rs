@@ -330,16 +330,16 @@ impl<'a> Analyzer<'a> {
         names: &mut BTreeMap<Symbol, VarId>,
     ) {
         let constant = section.constant.is_some();
-        if let Some((_, span)) = decl.edge {
-            self.report(&rules::NOT_SUPPORTED, span, "R_EDGE and F_EDGE are not of the language yet");
-        }
         for (at, name) in decl.names.iter().enumerate() {
             if name.is_missing() {
                 continue;
             }
-            let (ty, init) = match (self.open_array(&decl.ty, pou.kind, class, Some(id)), vars.last()) {
+            // The later names of `a, b : T` are what the first one is.
+            let first = decl.names.first().filter(|_| at > 0).and_then(|name| names.get(&name.symbol));
+            let first = first.and_then(|id| vars.get(id.0 as usize)).cloned();
+            let (ty, init) = match (self.open_array(&decl.ty, pou.kind, class, Some(id)), &first) {
                 (Some(ty), _) => (ty, Value::Zero),
-                (None, Some(last)) if at > 0 && !constant => (last.ty, last.init.clone()),
+                (None, Some(first)) if !constant => (first.ty, first.init.clone()),
                 _ => self.declared_value(decl, name.symbol, Some(id), constant),
             };
             if pou.kind == PouKind::Function && !matches!(class, VarClass::InOut | VarClass::External) {
@@ -358,13 +358,16 @@ impl<'a> Analyzer<'a> {
                 // Its body runs only when EN is TRUE, and may take ENO back (6.6.1.7).
                 var.init = Value::Scalar(Const::Int(1));
             }
-            var.located = if at == 0 { self.located(decl, ty) } else { vars.last().and_then(|last| last.located) };
+            var.located = if at == 0 { self.located(decl, ty) } else { first.and_then(|first| first.located) };
             if var.located.is_some() && pou.kind == PouKind::Function {
                 self.report(&rules::BAD_ADDRESS, decl.span, "a FUNCTION has no variables at fixed addresses");
             }
             var.retain = is_retained(section);
-            names.insert(name.symbol, VarId(u32::try_from(vars.len()).unwrap_or(u32::MAX)));
+            let here = VarId(u32::try_from(vars.len()).unwrap_or(u32::MAX));
+            names.insert(name.symbol, here);
+            let hidden = self.edge_input(decl, pou.kind, &mut var, here);
             vars.push(var);
+            vars.extend(hidden.into_iter().flatten());
         }
     }
 
@@ -490,6 +493,7 @@ fn new_var(name: &Ident, spelling: &str, ty: Ty, class: VarClass, init: Value) -
         located: None,
         retain: false,
         field: None,
+        edge: None,
     }
 }
 

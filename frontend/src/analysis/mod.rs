@@ -15,6 +15,7 @@ mod call;
 mod config;
 mod convert;
 mod declare;
+mod edges;
 mod expr;
 mod fold;
 mod init;

@@ -4,9 +4,11 @@
 //! parameter has a type of its own ([`TyKind::Open`]), a call says which array stands for it, and the lowering makes one function for
 //! each combination of arrays ([`crate::lower`]). So every access is checked against the bounds of the very array.
 
+use std::rc::Rc;
+
 use super::Analyzer;
 use super::expr::{Checker, broken};
-use super::tree::{Expr, ExprKind, PouId, VarClass, VarId, VarInfo};
+use super::tree::{Expr, ExprKind, PouId, PouInfo, Root, Stmt, StmtKind, VarClass, VarId, VarInfo};
 use super::types::{Const, DINT, Ty, TyDef, TyKind, Value};
 use crate::diagnostics::{semantic as names, types as rules};
 use crate::source::Span;
@@ -77,6 +79,19 @@ impl Checker<'_, '_> {
             self.an.report(&rules::MISMATCH, span, message);
         }
         fits
+    }
+
+    /// Adds the arrays that outputs of a function call go to, where their parameters are open.
+    pub(super) fn output_arrays(&self, info: &PouInfo, after: &[Rc<Stmt>], arrays: &mut Vec<(VarId, Ty)>) {
+        for statement in after {
+            if let StmtKind::Assign { target, value } = &statement.kind
+                && let ExprKind::Load(from) = &value.kind
+                && let Root::CallOutput(id) = from.root
+                && info.vars.get(id.0 as usize).is_some_and(|var| self.is_open(var.ty))
+            {
+                arrays.push((id, target.ty));
+            }
+        }
     }
 
     /// The arrays of a call that stand for open ones, in the order of declaration.

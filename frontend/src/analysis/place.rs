@@ -24,7 +24,7 @@ impl<'a> Checker<'_, 'a> {
         {
             let info = self.info.as_ref()?.vars.get(var.0 as usize)?;
             if info.class != VarClass::External {
-                return Some(Root::Var(var));
+                return Some(Root::Var(info.edge.map_or(var, |edge| edge.seen)));
             }
         }
         if let Some(&global) = self.environment.and_then(|environment| environment.get(&symbol)) {

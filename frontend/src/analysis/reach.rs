@@ -70,7 +70,8 @@ impl<'a> Analyzer<'a> {
         };
         self.check_externals(pou, environment);
         let mut checker = Checker::body(self, Some(pou), environment);
-        let statements = checker.block(&decl.body);
+        let mut statements = checker.edge_statements(pou);
+        statements.extend(checker.block(&decl.body));
         let callees = std::mem::take(&mut checker.callees).into_iter().collect();
         let usage = std::mem::take(&mut checker.usage);
         if let Some(test) = checker.test.take() {

@@ -57,6 +57,15 @@ pub struct PouInfo {
     pub block: Option<TyId>,
 }
 
+impl PouInfo {
+    /// Whether the variable at this position is one of the hidden two beside an [`EdgeInput`].
+    pub fn sees_edges(&self, at: usize) -> bool {
+        let beside = |back: usize| at.checked_sub(back).and_then(|input| self.vars.get(input)?.edge);
+        let is = |id: VarId| id.0 as usize == at;
+        beside(1).is_some_and(|edge| is(edge.seen)) || beside(2).is_some_and(|edge| is(edge.last))
+    }
+}
+
 /// Kinds of variables of a program organisation unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum VarClass {
@@ -99,6 +108,19 @@ pub struct VarInfo {
     pub retain: bool,
     /// Position among the fields of its function block.
     pub field: Option<u32>,
+    /// R_EDGE or F_EDGE.
+    pub edge: Option<EdgeInput>,
+}
+
+/// An input of which the body sees the edge.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct EdgeInput {
+    /// F_EDGE.
+    pub falling: bool,
+    /// What the body sees in the input's place.
+    pub seen: VarId,
+    /// The input at the call before.
+    pub last: VarId,
 }
 
 /// A global variable.

@@ -136,6 +136,11 @@ rules! {
         wrong "PROGRAM p\nVAR\n  i : INT;\nEND_VAR\n  FOR i := 1 TO 9 BY 0 DO\n    ;\n  END_FOR;\nEND_PROGRAM\n"
         right "PROGRAM p\nVAR\n  i : INT;\nEND_VAR\n  FOR i := 1 TO 9 BY 1 DO\n    ;\n  END_FOR;\nEND_PROGRAM\n"
     }
+    EDGE = "S0027" Error "R_EDGE or F_EDGE where there is no edge to see" {
+        "The edge of an input shows between one call and the next, so it is for inputs of type BOOL of a function block or program; a function remembers nothing."
+        wrong "FUNCTION f : BOOL\nVAR_INPUT\n  x : BOOL R_EDGE;\nEND_VAR\n  f := x;\nEND_FUNCTION\nPROGRAM p\nEND_PROGRAM\n"
+        right "FUNCTION_BLOCK F\nVAR_INPUT\n  x : BOOL R_EDGE;\nEND_VAR\nVAR_OUTPUT\n  n : INT;\nEND_VAR\n  IF x THEN\n    n := n + 1;\n  END_IF;\nEND_FUNCTION_BLOCK\nPROGRAM p\nVAR\n  f : F;\nEND_VAR\n  f(x := TRUE);\nEND_PROGRAM\n"
+    }
     DUPLICATE_TASK = "S0030" Error "two tasks of one name" {
         "Task names are unique in their resource, so that WITH means one of them."
         wrong "PROGRAM p\nEND_PROGRAM\nCONFIGURATION c\n  RESOURCE r ON cpu\n    TASK t(INTERVAL := T#1ms, PRIORITY := 0);\n    TASK t(INTERVAL := T#2ms, PRIORITY := 1);\n    PROGRAM i WITH t : p;\n  END_RESOURCE\nEND_CONFIGURATION\n"

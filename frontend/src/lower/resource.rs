@@ -416,7 +416,7 @@ impl Builder<'_> {
                 }
             }
             Some((instance, info, at)) => {
-                if let Some(var) = info.vars.get(at).filter(|var| is_dumped(var.class)) {
+                if let Some(var) = info.vars.get(at).filter(|var| is_dumped(var.class) && !info.sees_edges(at)) {
                     found.push((format!("{}.{}", instance.name, var.name), home, var.ty, var.constant));
                 }
             }

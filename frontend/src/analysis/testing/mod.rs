@@ -261,6 +261,7 @@ impl<'a> Checker<'_, 'a> {
                 init: Value::Zero,
                 located: None,
                 retain: false,
+                edge: None,
                 field: None,
             });
         }
