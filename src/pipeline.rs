@@ -183,7 +183,15 @@ impl Program {
         let verified = Arc::clone(&self.verified);
         Ok(match kind {
             EngineKind::Interp => Box::new(Interpreter::new(verified, layout, InterpreterOptions { fuel })),
-            EngineKind::Jit => Box::new(Jit::new(verified, layout, JitOptions { fuel, ..JitOptions::default() })?),
+            EngineKind::Jit => Box::new(self.jit(layout, JitOptions { fuel, ..JitOptions::default() })?),
         })
+    }
+
+    /// The native-code engine, with all that can be chosen about it.
+    ///
+    /// # Errors
+    /// When native code can not be made.
+    pub fn jit(&self, layout: &ImageLayout, options: JitOptions) -> Result<Jit, JitError> {
+        Jit::new(Arc::clone(&self.verified), layout, options)
     }
 }

@@ -7,11 +7,11 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use cranelift_codegen::ir::{self, Signature};
-use cranelift_codegen::isa::OwnedTargetIsa;
+use cranelift_codegen::isa::{OwnedTargetIsa, TargetIsa};
 use cranelift_codegen::settings::{self, Configurable};
-use cranelift_codegen::{Context as Compilation, control::ControlPlane};
+use cranelift_codegen::{CodegenResult, CompiledCode, Context as Compilation, control::ControlPlane};
 use cranelift_jit::{ArenaMemoryProvider, JITBuilder, JITModule};
-use cranelift_module::{FuncId, Linkage, Module};
+use cranelift_module::{FuncId, Linkage, Module, ModuleReloc};
 use khz_bytecode::ids::FunctionId;
 use khz_bytecode::limits::MAX_TRAP_CHAIN;
 use khz_machine::engine::DeadlineCell;
@@ -20,10 +20,13 @@ use khz_machine::trap::CodePlace;
 
 use crate::build::ProgramMemory;
 use crate::context::Context;
+use crate::counts::{self, BlockCounts};
 use crate::lower::Linker;
 use crate::mir::{Place, PlaceData};
+use crate::run::FormOf;
 use crate::runtime::Virtuals;
-use crate::{JitError, runtime};
+use crate::symbols::{Note, lines_of};
+use crate::{JitError, JitOptions, runtime};
 
 /// A function as it is compiled for a program's memory.
 pub type Key = (FunctionId, ProgramMemory);
@@ -47,6 +50,8 @@ pub struct Code {
     /// Places that traps name.
     pub places: Vec<PlaceEntry>,
     addresses: BTreeMap<Key, *const u8>,
+    notes: Vec<(Note, *const u8)>,
+    counts: Option<Arc<BlockCounts>>,
     bytes: usize,
     image_bytes: u32,
     frames: Vec<Range<u32>>,
@@ -77,6 +82,20 @@ impl Code {
     #[must_use]
     pub fn bytes(&self) -> usize {
         self.bytes
+    }
+
+    /// What was noted of each function and part ([`crate::JitOptions::note_lines`]), and its machine code.
+    pub fn notes(&self) -> impl Iterator<Item = (&Note, &[u8])> {
+        self.notes.iter().map(|(note, address)| {
+            // SAFETY: the module placed so many bytes of finished code there; nobody writes them, and they are freed when `self` goes.
+            (note, unsafe { std::slice::from_raw_parts(*address, note.bytes) })
+        })
+    }
+
+    /// The counters that the code moves, where it does ([`crate::JitOptions::count_blocks`]).
+    #[must_use]
+    pub fn counts(&self) -> Option<&Arc<BlockCounts>> {
+        self.counts.as_ref()
     }
 
     /// The address of a function, for tables that this code itself reads.
@@ -176,14 +195,24 @@ impl Handle {
     }
 }
 
+/// What code is made for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Use {
+    /// To be run, or to be shown as Cranelift sees it.
+    Run,
+    /// To be listed: the same code, and it is noted where its blocks start.
+    List,
+}
+
 /// The host as a target, with its CPU's features.
 ///
 /// # Errors
 /// A host that Cranelift does not know.
-pub fn host_isa(verify_ir: bool) -> Result<OwnedTargetIsa, JitError> {
+pub fn host_isa(verify_ir: bool, what: Use) -> Result<OwnedTargetIsa, JitError> {
     let mut flags = settings::builder();
     let options = [
         ("opt_level", "speed"),
+        ("machine_code_cfg_info", if what == Use::List { "true" } else { "false" }),
         ("enable_verifier", if verify_ir { "true" } else { "false" }),
         ("is_pic", "false"),
         ("use_colocated_libcalls", "false"),
@@ -198,6 +227,32 @@ pub fn host_isa(verify_ir: bool) -> Result<OwnedTargetIsa, JitError> {
     }
     let builder = cranelift_native::builder().map_err(|error| JitError::Host(error.to_string()))?;
     builder.finish(settings::Flags::new(flags)).map_err(|error| JitError::Host(error.to_string()))
+}
+
+/// Compiles a lowered function as Cranelift does, but for what `change` does to it between the optimiser and the making of machine code.
+///
+/// # Errors
+/// Code that Cranelift refuses.
+pub(crate) fn compile_marked(
+    compilation: &mut Compilation,
+    isa: &dyn TargetIsa,
+    change: impl FnOnce(&mut ir::Function),
+) -> CodegenResult<CompiledCode> {
+    compilation.optimize(isa, &mut ControlPlane::default())?;
+    change(&mut compilation.func);
+    let (function, dominators) = (&compilation.func, &compilation.domtree);
+    let allocator = &mut Default::default();
+    let stencil = isa.compile_function(function, dominators, allocator, false, &mut ControlPlane::default())?;
+    Ok(stencil.apply_params(&function.params))
+}
+
+/// What a call in code goes to.
+#[derive(Debug, Clone, Copy)]
+pub enum Called {
+    /// A function of the program.
+    Function(Key),
+    /// A routine of the host.
+    Routine(&'static str),
 }
 
 /// Code in the making.
@@ -216,6 +271,11 @@ pub struct Assembly {
     bytes: usize,
     stack_bytes: BTreeMap<Key, u32>,
     failure: Option<JitError>,
+    /// Whether [`Note`]s are taken.
+    note_lines: bool,
+    notes: Vec<(Note, FuncId)>,
+    /// The counters of code that counts.
+    counting: Option<BlockCounts>,
 }
 
 impl Assembly {
@@ -226,6 +286,7 @@ impl Assembly {
     pub fn new(
         isa: OwnedTargetIsa,
         instructions: usize,
+        options: JitOptions,
         signatures: Box<dyn Fn(Key) -> Signature + Send>,
     ) -> Result<Self, JitError> {
         let mut builder = JITBuilder::with_isa(isa, Box::new(|call| format!("{call:?}")));
@@ -250,6 +311,9 @@ impl Assembly {
             bytes: 0,
             stack_bytes: BTreeMap::new(),
             failure: None,
+            note_lines: options.note_lines,
+            notes: Vec::new(),
+            counting: options.count_blocks.then(BlockCounts::default),
         })
     }
 
@@ -259,66 +323,84 @@ impl Assembly {
         self.module.make_context()
     }
 
-    /// Forgets the parts of the function before.
-    pub fn start_function(&mut self) {
-        self.parts.clear();
-        self.part_stack_bytes.clear();
-        self.start_form();
-    }
-
     /// Forgets the places of the form before.
     pub fn start_form(&mut self) {
         self.known_places.clear();
     }
 
-    /// Compiles a lowered function. `parts`: which of its parts it calls itself.
+    /// Compiles a lowered form.
     ///
     /// # Errors
     /// Code that Cranelift refuses.
-    pub fn define(&mut self, key: Key, compilation: &mut Compilation, parts: &[u32]) -> Result<(), JitError> {
-        let id = self.declare(key).map_err(|error| self.failed(key, error))?;
-        let stack_bytes = self.define_form(key, id, compilation, parts)?;
-        self.stack_bytes.insert(key, stack_bytes);
+    pub fn define(&mut self, of: &FormOf<'_>, compilation: &mut Compilation) -> Result<(), JitError> {
+        let declared = match of.part {
+            None => self.declare(of.key),
+            Some(number) => self.declare_part(number, &compilation.func.signature),
+        };
+        let id = declared.map_err(|error| self.failed(of.key, error))?;
+        let stack_bytes = self.define_form(of, id, compilation)?;
+        if of.part.is_some() {
+            self.part_stack_bytes.push(stack_bytes);
+        } else {
+            self.stack_bytes.insert(of.key, stack_bytes);
+            self.parts.clear();
+            self.part_stack_bytes.clear();
+        }
         Ok(())
     }
 
-    /// Compiles a lowered part of a function, the next one. `parts`: which other parts it calls itself.
-    ///
-    /// # Errors
-    /// Code that Cranelift refuses.
-    pub fn define_part(&mut self, key: Key, compilation: &mut Compilation, parts: &[u32]) -> Result<(), JitError> {
-        let number = self.part_stack_bytes.len() as u32;
-        let id = self.declare_part(number, &compilation.func.signature).map_err(|error| self.failed(key, error))?;
-        let stack_bytes = self.define_form(key, id, compilation, parts)?;
-        self.part_stack_bytes.push(stack_bytes);
-        Ok(())
-    }
-
-    fn define_form(
-        &mut self,
-        key: Key,
-        id: FuncId,
-        compilation: &mut Compilation,
-        parts: &[u32],
-    ) -> Result<u32, JitError> {
+    fn define_form(&mut self, of: &FormOf<'_>, id: FuncId, compilation: &mut Compilation) -> Result<u32, JitError> {
         if let Some(failure) = self.failure.take() {
             return Err(failure);
         }
+        let refused = |reason: String| JitError::Function { function: of.key.0, reason };
         let passed = compilation.func.signature.params.len() + compilation.func.signature.returns.len();
-        let done = self.module.define_function_with_control_plane(id, compilation, &mut ControlPlane::default());
-        done.map_err(|error| JitError::Function { function: key.0, reason: format!("{error:?}") })?;
+        let counting;
+        let compiled = if let Some(counts) = &mut self.counting {
+            counting = compile_marked(compilation, self.module.isa(), |function| counts::insert(function, counts));
+            let compiled = counting.as_ref().map_err(|error| refused(format!("{error:?}")))?;
+            let relocations = compiled.buffer.relocs().iter();
+            let relocations: Vec<_> =
+                relocations.map(|relocation| ModuleReloc::from_mach_reloc(relocation, &compilation.func, id)).collect();
+            let (alignment, bytes) = (u64::from(compiled.buffer.alignment), compiled.code_buffer());
+            let done = self.module.define_function_bytes(id, alignment, bytes, &relocations);
+            done.map_err(|error| refused(format!("{error:?}")))?;
+            Some(compiled)
+        } else {
+            let done = self.module.define_function_with_control_plane(id, compilation, &mut ControlPlane::default());
+            done.map_err(|error| refused(format!("{error:?}")))?;
+            compilation.compiled_code()
+        };
         let mut stack_bytes = 0_u32;
-        if let Some(compiled) = compilation.compiled_code() {
-            self.bytes += compiled.code_buffer().len();
+        if let Some(compiled) = compiled {
+            let bytes = compiled.code_buffer().len();
+            self.bytes += bytes;
             // Above the frame lie the saved frame pointer, the return address and arguments that the caller pushed, which belong to the caller's frame.
             let frame = compiled.buffer.frame_layout().map_or(0, |layout| layout.frame_to_fp_offset);
-            let called = parts.iter().filter_map(|part| self.part_stack_bytes.get(*part as usize)).max();
+            let called = of.form.parts().filter_map(|part| self.part_stack_bytes.get(part as usize)).max();
             stack_bytes = frame.saturating_add(16).saturating_add(called.copied().unwrap_or(0));
             // What is pushed for it counts here: at most 16 bytes each.
             stack_bytes = stack_bytes.saturating_add(u32::try_from(passed).unwrap_or(u32::MAX).saturating_mul(16));
+            if self.note_lines {
+                let lines = lines_of(of.form, compiled.buffer.get_srclocs_sorted());
+                self.notes.push((Note { key: of.key, part: of.part, bytes, lines }, id));
+            }
         }
         self.module.clear_context(compilation);
         Ok(stack_bytes)
+    }
+
+    /// What a call in code goes to: a function, one of its parts, or a routine of the host.
+    #[must_use]
+    pub fn named(&self) -> BTreeMap<u32, Called> {
+        let functions = self.functions.iter().map(|(key, id)| (id.as_u32(), Called::Function(*key)));
+        let routines = self.routines.iter().map(|(name, id)| (id.as_u32(), Called::Routine(name)));
+        functions.chain(routines).collect()
+    }
+
+    /// The numbers that the parts of the function at hand have in code; forgets them.
+    pub fn take_parts(&mut self) -> BTreeMap<u32, u32> {
+        std::mem::take(&mut self.parts).into_iter().map(|(number, id)| (id.as_u32(), number)).collect()
     }
 
     fn declare_part(&mut self, number: u32, signature: &Signature) -> Result<FuncId, String> {
@@ -358,10 +440,13 @@ impl Assembly {
         self.module.finalize_definitions().map_err(|error| JitError::Memory(error.to_string()))?;
         let address = |id: &FuncId| self.module.get_finalized_function(*id);
         let addresses = self.functions.iter().map(|(key, id)| (*key, address(id))).collect();
+        let notes = self.notes.into_iter().map(|(note, id)| (note, address(&id))).collect();
         Ok(Code {
             module: Some(self.module),
             places: self.places,
             addresses,
+            notes,
+            counts: self.counting.map(Arc::new),
             bytes: self.bytes,
             image_bytes: layout.total_bytes(),
             frames: layout.frames.clone(),

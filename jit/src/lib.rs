@@ -16,15 +16,18 @@
 pub mod build;
 pub mod context;
 pub mod cut;
+pub mod listing;
 pub mod lower;
 pub mod mir;
 pub mod passes;
 pub mod text;
 
 mod code;
+mod counts;
 mod plan;
 mod run;
 mod runtime;
+mod symbols;
 
 use std::sync::Arc;
 
@@ -33,9 +36,11 @@ use khz_bytecode::verify::Verified;
 use khz_machine::image::ImageLayout;
 
 pub use code::Handle;
+pub use counts::BlockCounts;
 pub use passes::Passes;
 pub use run::Jit;
-pub use text::{asm_text, clif_text, mir_text};
+pub use symbols::{LineRange, Symbol};
+pub use text::{clif_text, mir_text};
 
 /// What code is made like.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -50,6 +55,10 @@ pub struct JitOptions {
     pub note_passes: bool,
     /// From how many instructions of the mid-level form on a stretch of a longer function is [cut out](cut): [`cut::PART_ITEMS`], but for tests.
     pub part_items: usize,
+    /// Whether it is noted which bytes of the code come from which source line ([`Jit::symbols`]): for profilers. The code is the same.
+    pub note_lines: bool,
+    /// Whether the code counts how often each block is run ([`Jit::block_counts`]): for [`listing`]. It is slower then and otherwise the same.
+    pub count_blocks: bool,
 }
 
 impl Default for JitOptions {
@@ -60,6 +69,8 @@ impl Default for JitOptions {
             passes: Passes::default(),
             note_passes: false,
             part_items: cut::PART_ITEMS,
+            note_lines: false,
+            count_blocks: false,
         }
     }
 }

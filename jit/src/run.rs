@@ -14,12 +14,14 @@ use khz_machine::instance_map::InstanceMap;
 use khz_machine::trap::{CodePlace, Trap};
 
 use crate::build::{ProgramMemory, Scope, build};
-use crate::code::{Assembly, Code, Handle, Key, host_isa};
+use crate::code::{Assembly, Code, Handle, Key, Use, host_isa};
 use crate::context::{Context, OUT_OF_FUEL};
+use crate::counts::BlockCounts;
 use crate::lower::{Settings, lower, signature};
 use crate::passes::{Improver, Passes};
 use crate::plan::{EntryPoint, Plan};
 use crate::runtime::{VirtualEntry, Virtuals};
+use crate::symbols::{Symbol, symbols};
 use crate::{JitError, JitOptions, MAX_STACK_BYTES};
 
 /// What lowering needs to know of a target.
@@ -29,7 +31,7 @@ pub(crate) fn settings_for(isa: &OwnedTargetIsa, plan: &Plan, options: JitOption
         fuel: options.fuel,
         depth: plan.calls_virtual,
         native_nan: matches!(isa.triple().architecture, target_lexicon::Architecture::X86_64),
-        source_lines: false,
+        source_lines: options.note_lines,
     }
 }
 
@@ -43,12 +45,17 @@ pub(crate) fn signatures(
 }
 
 /// A module that knows the signatures of a plan's functions.
-pub(crate) fn assembly(scope: &Scope<'_>, plan: &Plan, isa: OwnedTargetIsa) -> Result<Assembly, JitError> {
+pub(crate) fn assembly(
+    scope: &Scope<'_>,
+    plan: &Plan,
+    isa: OwnedTargetIsa,
+    options: JitOptions,
+) -> Result<Assembly, JitError> {
     let convention = isa.default_call_conv();
     let known = signatures(scope, plan, convention);
     let signature =
         move |key: Key| known.get(&key).cloned().unwrap_or_else(|| cranelift_codegen::ir::Signature::new(convention));
-    Assembly::new(isa, plan.instructions, Box::new(signature))
+    Assembly::new(isa, plan.instructions, options, Box::new(signature))
 }
 
 /// What compiling a plan gives.
@@ -60,35 +67,57 @@ pub(crate) struct Compiled {
     fired: Option<Passes>,
 }
 
-/// Compiles a plan.
-pub(crate) fn compile(scope: &Scope<'_>, plan: &Plan, options: JitOptions) -> Result<Compiled, JitError> {
-    let isa = host_isa(options.verify_ir)?;
-    let settings = settings_for(&isa, plan, options);
-    let mut assembly = assembly(scope, plan, isa)?;
-    let mut compilation = assembly.compilation();
-    let mut builder_context = FunctionBuilderContext::new();
-    let mut improver = Improver::new(scope, options, plan.calls_virtual);
-    for key in plan.functions.keys() {
+/// One form that is compiled: a part that was cut out of a function, or the function that is left.
+pub(crate) struct FormOf<'a> {
+    /// The function.
+    pub key: Key,
+    /// Number of the part; `None`: the function itself, which comes after its parts.
+    pub part: Option<u32>,
+    /// What is lowered.
+    pub form: &'a crate::mir::Function,
+}
+
+/// Builds and improves functions in order and shows `take` every form of each. Gives the passes that changed something, where that is noted.
+///
+/// # Errors
+/// The first one of `take`.
+pub(crate) fn for_each_form(
+    scope: &Scope<'_>,
+    keys: impl IntoIterator<Item = Key>,
+    calls_virtual: bool,
+    options: JitOptions,
+    mut take: impl FnMut(&FormOf<'_>) -> Result<(), JitError>,
+) -> Result<Option<Passes>, JitError> {
+    let mut improver = Improver::new(scope, options, calls_virtual);
+    for key in keys {
         let mut function = build(scope, key.0, key.1);
         let parts = improver.run(&mut function, key.1);
-        assembly.start_function();
-        for form in parts.iter().chain([&function]) {
-            assembly.start_form();
-            lower(scope, form, key.1, settings, &mut assembly, &mut compilation.func, &mut builder_context);
-            let called: Vec<u32> = form.parts().collect();
-            if std::ptr::eq(form, &raw const function) {
-                assembly.define(*key, &mut compilation, &called)?;
-            } else {
-                assembly.define_part(*key, &mut compilation, &called)?;
-            }
+        for (number, form) in (0..).zip(&parts) {
+            take(&FormOf { key, part: Some(number), form })?;
         }
+        take(&FormOf { key, part: None, form: &function })?;
     }
+    Ok(improver.fired())
+}
+
+/// Compiles a plan.
+pub(crate) fn compile(scope: &Scope<'_>, plan: &Plan, options: JitOptions) -> Result<Compiled, JitError> {
+    let isa = host_isa(options.verify_ir, Use::Run)?;
+    let settings = settings_for(&isa, plan, options);
+    let mut assembly = assembly(scope, plan, isa, options)?;
+    let mut compilation = assembly.compilation();
+    let mut builder_context = FunctionBuilderContext::new();
+    let fired = for_each_form(scope, plan.functions.keys().copied(), plan.calls_virtual, options, |of| {
+        assembly.start_form();
+        lower(scope, of.form, of.key.1, settings, &mut assembly, &mut compilation.func, &mut builder_context);
+        assembly.define(of, &mut compilation)
+    })?;
     let needed_bytes = stack_bytes(scope, plan, assembly.stack_bytes());
     if needed_bytes > MAX_STACK_BYTES {
         return Err(JitError::Stack { needed_bytes, limit_bytes: MAX_STACK_BYTES });
     }
     let code = assembly.finish(scope.layout)?;
-    Ok(Compiled { code, stack_bytes: needed_bytes, fired: improver.fired() })
+    Ok(Compiled { code, stack_bytes: needed_bytes, fired })
 }
 
 /// What the deepest nesting of calls may take of a thread's stack: the longest chain of direct calls, or, where virtual calls may recurse, the
@@ -177,6 +206,19 @@ impl Jit {
     #[must_use]
     pub fn passes_fired(&self) -> Option<Passes> {
         self.parts.fired
+    }
+
+    /// What the machine code is made of, function by function, at its addresses in this process; nothing unless [`JitOptions::note_lines`] asked
+    /// for it. For profilers.
+    #[must_use]
+    pub fn symbols(&self) -> Vec<Symbol<'_>> {
+        symbols(&self.verified, self.parts.code.notes())
+    }
+
+    /// How often each block was run so far; `None` unless [`JitOptions::count_blocks`] asked for it. Shared with the code, which goes on counting.
+    #[must_use]
+    pub fn block_counts(&self) -> Option<Arc<BlockCounts>> {
+        self.parts.code.counts().cloned()
     }
 
     fn handle(&self, entry: Entry) -> Option<&Handle> {

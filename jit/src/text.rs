@@ -1,29 +1,28 @@
-//! What `khz disasm` prints: the mid-level form, CLIF and machine code of a function, each with the source lines it comes from.
+//! What `khz disasm` prints of the steps to machine code: the mid-level form and CLIF of a function, each with the source lines it comes from.
+//! ([`crate::listing`] has the machine code.)
 
 use std::fmt::Write;
 
 use cranelift_codegen::ir::SourceLoc;
 use cranelift_frontend::FunctionBuilderContext;
-use khz_bytecode::container::{DebugSection, LineEntry};
+use khz_bytecode::container::DebugSection;
 use khz_bytecode::ids::FunctionId;
 use khz_bytecode::verify::Verified;
 use khz_machine::image::ImageLayout;
+use khz_machine::trap::CodePlace;
 
 use crate::build::{ProgramMemory, build};
-use crate::code::{Key, host_isa};
+use crate::code::{Key, Use, host_isa};
 use crate::lower::{Settings, lower};
 use crate::passes::Improver;
 use crate::plan::{self, Plan};
 use crate::run::{assembly, settings_for};
+use crate::symbols::{self, place_of};
 use crate::{JitError, JitOptions, mir};
 
-/// The source line of a bytecode offset, as `file:line`.
-fn source_line(debug: Option<&DebugSection>, function: FunctionId, offset: u32) -> Option<String> {
-    let debug = debug?;
-    let behind = debug.lines.partition_point(|line| (line.function, line.offset) <= (function, offset));
-    let entry: &LineEntry = debug.lines.get(behind.checked_sub(1)?)?;
-    let file = debug.files.get(usize::from(entry.file)).filter(|_| entry.function == function)?;
-    Some(format!("{}:{}", file.name, entry.line))
+/// The source line of a place, as `file:line`.
+fn source_line(debug: Option<&DebugSection>, place: CodePlace) -> Option<String> {
+    symbols::source_line(debug, place).map(|(file, line)| format!("{file}:{line}"))
 }
 
 /// A function as it is compiled: for the first program instance that reaches it.
@@ -43,7 +42,7 @@ pub fn mir_text(verified: &Verified, layout: &ImageLayout, options: JitOptions, 
     let text = |form: &mir::Function| {
         form.text(&|place| {
             let data = form.places[place.index()];
-            source_line(debug, data.function, data.offset)
+            source_line(debug, CodePlace { function: data.function, offset: data.offset })
         })
     };
     titled(forms.iter().map(text))
@@ -92,35 +91,11 @@ pub fn clif_text(
     options: JitOptions,
     function: FunctionId,
 ) -> Result<String, JitError> {
-    compiled(verified, layout, options, function, false)
-}
-
-/// A function as machine code: Cranelift's listing, then which bytes come from which source line.
-///
-/// # Errors
-/// A host without native code, or a function that Cranelift refuses.
-pub fn asm_text(
-    verified: &Verified,
-    layout: &ImageLayout,
-    options: JitOptions,
-    function: FunctionId,
-) -> Result<String, JitError> {
-    compiled(verified, layout, options, function, true)
-}
-
-/// CLIF of a function and its parts, or their machine code.
-fn compiled(
-    verified: &Verified,
-    layout: &ImageLayout,
-    options: JitOptions,
-    function: FunctionId,
-    machine_code: bool,
-) -> Result<String, JitError> {
     let scope = plan::scope(verified, layout);
     let plan = Plan::new(&scope);
-    let isa = host_isa(options.verify_ir)?;
+    let isa = host_isa(options.verify_ir, Use::Run)?;
     let settings = Settings { source_lines: true, ..settings_for(&isa, &plan, options) };
-    let mut module = assembly(&scope, &plan, isa.clone())?;
+    let mut module = assembly(&scope, &plan, isa, options)?;
     let mut compilation = module.compilation();
     let Some((key, forms)) = forms_of(&scope, &plan, options, function) else { return Ok(String::new()) };
     let mut builder_context = FunctionBuilderContext::new();
@@ -129,38 +104,11 @@ fn compiled(
     for form in &forms {
         module.start_form();
         lower(&scope, form, key.1, settings, &mut module, &mut compilation.func, &mut builder_context);
-        let line = |location: SourceLoc| {
-            let place = Some(location).filter(|location| !location.is_default())?.bits();
-            let data = form.places.get(place as usize)?;
-            source_line(debug, data.function, data.offset)
-        };
-        listings.push(if machine_code {
-            machine_listing(&mut compilation, &*isa, function, &line)?
-        } else {
-            with_lines(&compilation.func.display().to_string(), &line)
-        });
+        let line = |location: SourceLoc| source_line(debug, place_of(form, location)?);
+        listings.push(with_lines(&compilation.func.display().to_string(), &line));
         compilation.clear();
     }
     Ok(titled(listings.into_iter()))
-}
-
-fn machine_listing(
-    compilation: &mut cranelift_codegen::Context,
-    isa: &dyn cranelift_codegen::isa::TargetIsa,
-    function: FunctionId,
-    line: &dyn Fn(SourceLoc) -> Option<String>,
-) -> Result<String, JitError> {
-    compilation.set_disasm(true);
-    let done = compilation.compile(isa, &mut cranelift_codegen::control::ControlPlane::default());
-    let code = done.map_err(|error| JitError::Function { function, reason: format!("{:?}", error.inner) })?;
-    let mut assembly = code.vcode.clone().unwrap_or_default();
-    let _ = writeln!(assembly, "; {} bytes", code.code_buffer().len());
-    for range in code.buffer.get_srclocs_sorted() {
-        if let Some(line) = line(range.loc) {
-            let _ = writeln!(assembly, "; {:#06x}..{:#06x} {line}", range.start, range.end);
-        }
-    }
-    Ok(assembly)
 }
 
 /// CLIF marks lines with `@` and the place in hexadecimal; each change of the source line gets a line of its own.

@@ -142,8 +142,12 @@ pub struct VerifyArgs {
     pub common: Common,
 }
 
+/// What a program is given when it is run, which `khz disasm` only does for `--hot`.
+const NEEDS_HOT: [&str; 4] = ["set", "inputs", "watchdog_us", "scans"];
+
 /// `khz disasm`.
 #[derive(Debug, Args)]
+#[command(mut_args(|arg| if NEEDS_HOT.contains(&arg.get_id().as_str()) { arg.requires("hot") } else { arg }))]
 pub struct DisasmArgs {
     #[command(flatten)]
     #[allow(missing_docs, reason = "clap would show it as help of the group")]
@@ -157,9 +161,15 @@ pub struct DisasmArgs {
     /// Machine code
     #[arg(long, group = "form")]
     pub asm: bool,
-    /// Which RESOURCE, when there are several
-    #[arg(long, value_name = "NAME")]
-    pub resource: Option<String>,
+    /// Run the program on the virtual clock and say which source lines cost most: machine instructions that were run, counted, not timed
+    #[arg(long, requires = "asm")]
+    pub hot: bool,
+    /// Rounds to run for --hot
+    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u64).range(1..))]
+    pub scans: u64,
+    #[command(flatten)]
+    #[allow(missing_docs, reason = "clap would show it as help of the group")]
+    pub resource: ResourceArgs,
     #[command(flatten)]
     #[allow(missing_docs, reason = "clap would show it as help of the group")]
     pub common: Common,

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use khz_machine::engine::Engine;
 use khz_machine::image::Image;
 use khz_machine::variables::VariableTable;
 use khz_scheduler::{Clock, Faulted, HoldsContainer, LoadError, LoadOptions, Resource, StopHandle, Stopped};
@@ -46,7 +47,7 @@ impl<'a> Session<'a> {
         has_watchdog || starts_with_code
     }
 
-    /// Loads the resource with an engine and a clock, and applies `--set`.
+    /// Loads the resource with an engine of its own and a clock, and applies `--set`.
     pub fn open(
         &self,
         kind: EngineKind,
@@ -57,6 +58,17 @@ impl<'a> Session<'a> {
     ) -> Result<Opened, Failure> {
         let layout = self.program.layout(self.args.max_image).map_err(Failure::refused)?;
         let engine = self.program.engine(kind, &layout, fuel).map_err(Failure::refused)?;
+        self.open_with(engine, clock, stop, rt)
+    }
+
+    /// Loads the resource with an engine that was made for its layout.
+    pub fn open_with(
+        &self,
+        engine: Box<dyn Engine>,
+        clock: Box<dyn Clock>,
+        stop: Option<StopHandle>,
+        rt: Option<u8>,
+    ) -> Result<Opened, Failure> {
         let options = LoadOptions {
             max_image_bytes: self.args.max_image,
             watchdog_us: self.args.watchdog_us,

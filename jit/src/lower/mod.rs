@@ -196,6 +196,8 @@ impl Lowerer<'_, '_> {
                 self.builder.switch_to_block(self.blocks[number]);
             }
             self.write_back = data.write_back;
+            // What is added for a block without instructions, such as the way out of a function, belongs to no line.
+            self.builder.set_srcloc(ir::SourceLoc::default());
             for instruction in &data.instructions {
                 self.place = instruction.place;
                 if self.settings.source_lines {
@@ -205,6 +207,7 @@ impl Lowerer<'_, '_> {
             }
             self.terminator(&data.terminator);
         }
+        self.builder.set_srcloc(ir::SourceLoc::default());
         self.finish_exits();
         self.builder.seal_all_blocks();
         let config = self.frontend_config();
