@@ -10,7 +10,8 @@
 //! - `khz-interp`, `khz-jit`: the engines
 //! - `khz-scheduler`: tasks, clocks, watchdogs, statistics
 //!
-//! [`lockstep`] holds engines against each other round by round, [`traces`] a program against a recorded trace.
+//! [`lockstep`] holds engines against each other round by round, [`traces`] a program against a recorded trace; [`profilers`] tells `perf` what
+//! native code is.
 //!
 //! The binary `khz` is in `src/main.rs`, a file for each subcommand in `src/cli/`.
 
@@ -18,6 +19,7 @@ pub mod files;
 pub mod inputs;
 pub mod lockstep;
 pub mod pipeline;
+pub mod profilers;
 pub mod project;
 pub mod testing;
 pub mod traces;

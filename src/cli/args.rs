@@ -204,6 +204,15 @@ pub enum ClockArg {
     Virtual,
 }
 
+/// What is written for `perf`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum PerfArg {
+    /// Names and addresses.
+    Map,
+    /// Names, addresses, code and source lines.
+    Jitdump,
+}
+
 /// What a running resource is given.
 #[derive(Debug, Clone, Args)]
 pub struct ResourceArgs {
@@ -260,6 +269,9 @@ pub struct RunArgs {
     /// Real-time priority (SCHED_FIFO, 1 to 98)
     #[arg(long, value_name = "PRIO", value_parser = clap::value_parser!(u8).range(1..=98))]
     pub rt: Option<u8>,
+    /// Tell `perf` about native code: /tmp/perf-PID.map, or jit-PID.dump in this folder, with source lines
+    #[arg(long, value_enum, value_name = "WHAT")]
+    pub perf: Option<PerfArg>,
     /// Processor to run on
     #[arg(long, value_name = "N")]
     pub cpu: Option<u32>,
@@ -292,6 +304,9 @@ pub struct BenchArgs {
     /// Figures as one self-contained HTML page
     #[arg(long, value_name = "OUT.html")]
     pub report: Option<PathBuf>,
+    /// Tell `perf` about native code: /tmp/perf-PID.map, or jit-PID.dump in this folder, with source lines
+    #[arg(long, value_enum, value_name = "WHAT")]
+    pub perf: Option<PerfArg>,
     /// Measure start latency per task on the real clock instead
     #[arg(long)]
     pub jitter: bool,

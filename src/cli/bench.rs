@@ -39,7 +39,8 @@ pub fn run(args: &BenchArgs) -> Outcome {
     }
     let frontend_ns = frontend_ns(args)?;
     let program = choose(load(&args.sources)?, args.resource.resource.as_deref())?;
-    let session = Session::new(program, &args.resource);
+    let mut session = Session::new(program, &args.resource);
+    session.profile_for(args.perf, args.engine != EnginesArg::Interp)?;
     let host = HostOptions::default();
     if args.jitter {
         let outcome = on_scan_thread(&host, |_| jitter::run(args, &session));

@@ -25,7 +25,8 @@ pub fn run(args: &RunArgs) -> Outcome {
         print_diagnostics(&loaded.diagnostics, &loaded.sources, Format::Human);
     }
     let program = choose(loaded, args.resource.resource.as_deref())?;
-    let session = Session::new(program, &args.resource);
+    let mut session = Session::new(program, &args.resource);
+    session.profile_for(args.perf, args.engine != EngineArg::Interp)?;
     let stop = StopHandle::new();
     stop_on_signals(&stop).map_err(|error| Failure::Message(Status::Host, format!("signal handlers: {error}")))?;
     let host =

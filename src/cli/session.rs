@@ -2,16 +2,18 @@
 
 use std::sync::Arc;
 
+use khz_jit::JitOptions;
 use khz_machine::engine::Engine;
-use khz_machine::image::Image;
+use khz_machine::image::{Image, ImageLayout};
 use khz_machine::variables::VariableTable;
 use khz_scheduler::{Clock, Faulted, HoldsContainer, LoadError, LoadOptions, Resource, StopHandle, Stopped};
 use kilohertz::pipeline::{EngineKind, Program};
+use kilohertz::profilers::{self, Profile};
 
 use super::Status;
-use super::args::ResourceArgs;
+use super::args::{PerfArg, ResourceArgs};
 use super::inputs::{CsvInputs, read_csv, set_values};
-use super::output::Failure;
+use super::output::{Failure, people};
 
 /// A program and what the command line gives it.
 pub struct Session<'a> {
@@ -21,6 +23,8 @@ pub struct Session<'a> {
     pub names: VariableTable,
     /// What it is given.
     pub args: &'a ResourceArgs,
+    /// What is written for a profiler when native code is made.
+    pub profile: Option<Profile>,
 }
 
 /// A resource that is ready to start, or one that trapped in its initialisation.
@@ -35,7 +39,19 @@ impl<'a> Session<'a> {
     /// A session of one program.
     pub fn new(program: Program, args: &'a ResourceArgs) -> Self {
         let names = VariableTable::of(program.container());
-        Session { program, names, args }
+        Session { program, names, args, profile: None }
+    }
+
+    /// Takes what `--perf` says. `native`: there will be native code.
+    pub fn profile_for(&mut self, perf: Option<PerfArg>, native: bool) -> Result<(), Failure> {
+        if perf.is_some() && !native {
+            return Err(Failure::usage("--perf is about native code, which the interpreter has none of"));
+        }
+        self.profile = perf.map(|perf| match perf {
+            PerfArg::Map => Profile::Map,
+            PerfArg::Jitdump => Profile::Jitdump,
+        });
+        Ok(())
     }
 
     /// Whether code charges fuel on the virtual clock: some task has a watchdog, or code runs before the first round.
@@ -57,8 +73,21 @@ impl<'a> Session<'a> {
         rt: Option<u8>,
     ) -> Result<Opened, Failure> {
         let layout = self.program.layout(self.args.max_image).map_err(Failure::refused)?;
-        let engine = self.program.engine(kind, &layout, fuel).map_err(Failure::refused)?;
+        let engine = match self.profile {
+            Some(profile) if kind == EngineKind::Jit => self.profiled(profile, &layout, fuel)?,
+            _ => self.program.engine(kind, &layout, fuel).map_err(Failure::refused)?,
+        };
         self.open_with(engine, clock, stop, rt)
+    }
+
+    /// Native code that a profiler is told about.
+    fn profiled(&self, profile: Profile, layout: &ImageLayout, fuel: bool) -> Result<Box<dyn Engine>, Failure> {
+        let options = JitOptions { fuel, note_lines: true, ..JitOptions::default() };
+        let engine = self.program.jit(layout, options).map_err(Failure::refused)?;
+        let path = profilers::write(profile, &engine.symbols());
+        let path = path.map_err(|error| Failure::Message(Status::Host, format!("--perf: {error}")))?;
+        people(&format!("native code is described in {}", path.display()));
+        Ok(Box::new(engine))
     }
 
     /// Loads the resource with an engine that was made for its layout.
