@@ -56,7 +56,12 @@ fn the_library_is_documented() {
             function.clause
         );
     }
-    out.push_str("\nConversions are not rows: `x_TO_y`, `TO_y`, `x_TRUNC_y` and `TRUNC_y` exist for every pair of types that can be converted.\n");
+    out.push_str("\nConversions are not rows: `x_TO_y`, `TO_y`, `x_TRUNC_y` and `TRUNC_y` exist for every pair of types that can be converted.\n\n\
+         `ADD_INT`, `GT_DINT`, `SEL_REAL` and so on are the functions with the type of their inputs said: every function over types of a group has\n\
+         such a name for each type of the group (table 21).\n\n\
+         `x_BCD_TO_y`, `BCD_TO_y`, `y_TO_BCD_x` and `TO_BCD_x` exist for every bit string x (BYTE, WORD, DWORD, LWORD) and unsigned integer y (table 22).\n\
+         A digit above 9 counts at its place like the others; `IS_VALID_BCD` finds it. Of a number with more digits than x has, the lowest are taken.\n\n\
+         Every call may give EN and take ENO (table 18): where EN is FALSE nothing is evaluated, ENO is FALSE and the result is the initial value of its type.\n");
     out.push_str("\n## Function blocks\n\nEach is Structured Text, compiled with the program that uses it.\n");
     for block in blocks::all() {
         let _ = write!(out, "\n### {}\n\n```text\n{}\n```\n", block.name, block.source.trim_end());

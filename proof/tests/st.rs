@@ -34,11 +34,11 @@ fn covers_the_library(tally: &Tally) {
         let types = tally.coverage.types_of(row.name);
         let single = !row.parameters.iter().any(|parameter| parameter.class.is_generic())
             || row.result == functions::ResultRule::WantedInteger;
-        let floats = row.parameters[0].class == functions::TypeClass::AnyReal;
-        let wanted = match (single, floats) {
-            (true, _) => 1,
-            (false, true) => 2,
-            (false, false) => 8,
+        let wanted = match row.parameters[0].class {
+            _ if single => 1,
+            functions::TypeClass::AnyReal | functions::TypeClass::Float => 2,
+            functions::TypeClass::BitString => 4,
+            _ => 8,
         };
         assert!(types >= wanted, "{} is called with {types} types", row.name);
         assert!(!compares(row.function) || types >= 16, "{} compares {types} types", row.name);

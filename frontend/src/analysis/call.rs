@@ -145,7 +145,10 @@ impl<'a> Checker<'_, 'a> {
                 if found.ty == Ty::Error {
                     return None;
                 }
-                self.an.report(&names::NO_EFFECT, span, "the result of this function is not used");
+                // ENO is an effect.
+                if !matches!(&found.kind, ExprKind::Enabled(enabled) if enabled.eno.is_some()) {
+                    self.an.report(&names::NO_EFFECT, span, "the result of this function is not used");
+                }
                 StmtKind::Evaluate(found)
             }
             Callee::Function(pou) => StmtKind::Call(Box::new(self.function_call(pou, args, span)?)),
@@ -422,7 +425,7 @@ impl<'a> Checker<'_, 'a> {
         Some(place)
     }
 
-    fn eno(&mut self, eno: &'a ast::Expr) -> Option<Place> {
+    pub(super) fn eno(&mut self, eno: &'a ast::Expr) -> Option<Place> {
         let place = self.target(eno)?;
         if place.ty != BOOL {
             self.an.report(&rules::MISMATCH, eno.span, "ENO is a BOOL");

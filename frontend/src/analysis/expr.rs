@@ -572,6 +572,11 @@ impl<'c, 'a> Checker<'c, 'a> {
         };
         let a = bring(self, a);
         let b = bring(self, b);
+        if let (ExprKind::Const(x), ExprKind::Const(y)) = (&a.kind, &b.kind)
+            && let Ok(folded) = fold::binary(BinOp::Pow, to, x, y)
+        {
+            return Expr { kind: ExprKind::Const(folded), ty: Ty::Elem(to), span };
+        }
         Expr { kind: ExprKind::Binary(BinOp::Pow, Box::new(a), Box::new(b)), ty: Ty::Elem(to), span }
     }
 }

@@ -1,10 +1,15 @@
-//! Constant folding: the arithmetic of the language on known values. Operations with a rounding of their own (transcendental
-//! functions) are not folded here, so that only one routine ever computes them.
+//! Constant folding: the arithmetic of the language on known values. What has a rounding of its own (transcendental functions),
+//! shifts, strings and the choice among floats are computed by the machine's routine of the instruction that would stand there.
 
 use khz_bytecode::container::ElementaryType as E;
 
-use super::tree::{BinOp, UnOp};
-use super::types::{Const, integer_type, is_duration, is_real, limits, widen, wrap};
+use khz_bytecode::instruction::NumericOp;
+use khz_bytecode::value::ValueType;
+use khz_machine::semantics::{StringPlace, Value, eval_helper, eval_numeric};
+
+use super::ops;
+use super::tree::{BinOp, Expr, ExprKind, TextOp, UnOp};
+use super::types::{Const, Ty, integer_type, is_duration, is_real, limits, widen, wrap};
 
 /// Nanoseconds in a millisecond, the unit in which TIME meets numbers.
 pub(crate) const NS_PER_MS: i64 = 1_000_000;
@@ -34,6 +39,10 @@ pub(super) enum Unfolded {
 pub(super) fn binary(op: BinOp, ty: E, a: &Const, b: &Const) -> Result<Const, Unfolded> {
     match (a, b) {
         (Const::Int(a), Const::Int(b)) => integer(op, ty, widen(ty, *a), widen(ty, *b)),
+        (Const::F32(_), Const::F32(_)) | (Const::F64(_), Const::F64(_)) if is_chosen_or_routine(op) => {
+            let found = ops::binary(op, ty).and_then(|code| machine(code, &[value(a, ty)?, value(b, ty)?], ty));
+            found.ok_or(Unfolded::Unknown)
+        }
         (Const::F32(a), Const::F32(b)) => {
             let found = match op {
                 BinOp::Add => a + b,
@@ -54,7 +63,11 @@ pub(super) fn binary(op: BinOp, ty: E, a: &Const, b: &Const) -> Result<Const, Un
             };
             Ok(Const::F64(canonical64(found)))
         }
-        (Const::Str(a), Const::Str(b)) => compare(op, Some(a.cmp(b))),
+        (Const::Str(x), Const::Str(y)) => match op {
+            BinOp::Min => Ok(if y < x { b } else { a }.clone()),
+            BinOp::Max => Ok(if y > x { b } else { a }.clone()),
+            _ => compare(op, Some(x.cmp(y))),
+        },
         _ => Err(Unfolded::Unknown),
     }
 }
@@ -119,9 +132,95 @@ fn integer(op: BinOp, ty: E, a: i128, b: i128) -> Result<Const, Unfolded> {
         BinOp::And | BinOp::AndThen => a & b,
         BinOp::Or | BinOp::OrElse => a | b,
         BinOp::Xor => a ^ b,
+        BinOp::Min => a.min(b),
+        BinOp::Max => a.max(b),
         _ => return compare(op, Some(a.cmp(&b))),
     };
     Ok(Const::Int(wrap(ty, found)))
+}
+
+/// Whether two floats go through a routine of the machine.
+fn is_chosen_or_routine(op: BinOp) -> bool {
+    matches!(op, BinOp::Min | BinOp::Max | BinOp::Pow | BinOp::Atan2)
+}
+
+/// A shift or rotation; the count is a DINT.
+pub(super) fn shift(op: BinOp, ty: E, a: &Const, count: &Const) -> Option<Const> {
+    machine(ops::binary(op, ty)?, &[value(a, ty)?, value(count, E::Dint)?], ty)
+}
+
+/// A constant as an instruction takes it.
+fn value(known: &Const, ty: E) -> Option<Value> {
+    Some(match known {
+        Const::Int(known) if ty.storage().value_type() == ValueType::I64 => Value::I64(*known),
+        #[expect(clippy::cast_possible_truncation, reason = "the low 32 bits are the value in a register")]
+        Const::Int(known) => Value::I32(*known as i32),
+        Const::F32(known) => Value::F32(*known),
+        Const::F64(known) => Value::F64(*known),
+        Const::Wide(_) | Const::Lit(..) | Const::Str(_) => return None,
+    })
+}
+
+/// What an instruction gives, as a constant of a type. `None`: it traps.
+fn machine(code: NumericOp, operands: &[Value], ty: E) -> Option<Const> {
+    Some(match eval_numeric(code, operands).ok()? {
+        Value::I32(found) => Const::Int(wrap(ty, i128::from(found))),
+        Value::I64(found) => Const::Int(wrap(ty, i128::from(found))),
+        Value::F32(found) => Const::F32(found),
+        Value::F64(found) => Const::F64(found),
+    })
+}
+
+/// A string operation whose operands are all known.
+pub(super) fn text(op: TextOp, parts: &[Expr]) -> Option<Const> {
+    let helper = ops::text(op)?;
+    // The result, then the operands, each in a string as long as it must be.
+    let length = |part: &Expr| match &part.kind {
+        ExprKind::Const(Const::Str(text)) => text.len(),
+        _ => 0,
+    };
+    let room = parts.iter().map(length).sum::<usize>();
+    let mut image = vec![0; room + 1];
+    let mut places = Vec::new();
+    if helper.result().is_none() {
+        places.push(StringPlace { at: 0, capacity: u16::try_from(room).ok()? });
+    }
+    let mut values = Vec::new();
+    for part in parts {
+        match (&part.kind, part.ty) {
+            (ExprKind::Const(Const::Str(text)), _) => {
+                let at = u32::try_from(image.len()).ok()?;
+                places.push(StringPlace { at, capacity: u16::try_from(text.len()).ok()? });
+                image.extend_from_slice(text);
+                image.push(0);
+            }
+            (ExprKind::Const(known), Ty::Elem(ty)) => values.push(value(known, ty)?),
+            _ => return None,
+        }
+    }
+    match eval_helper(helper, &mut image, &places, &values) {
+        Some(Value::I32(found)) => Some(Const::Int(wrap(E::Int, i128::from(found)))),
+        Some(_) => None,
+        None => Some(Const::Str(image.split(|byte| *byte == 0).next()?.into())),
+    }
+}
+
+/// The number in decimal digits of a bit string's width, or the digits of a number.
+fn decimal(op: UnOp, bytes: u32, known: i128) -> i128 {
+    let (from, to) = if op == UnOp::FromBcd { (16, 10) } else { (10, 16) };
+    (0..bytes * 2).fold(0, |sum, at| sum + known / i128::pow(from, at) % from * i128::pow(to, at))
+}
+
+/// Bytes and digits.
+fn code(op: UnOp, ty: E, known: i64) -> Option<Const> {
+    let bytes = ty.storage().bytes();
+    let wide = widen(ty, known);
+    Some(Const::Int(match op {
+        UnOp::FromBcd | UnOp::ToBcd => wrap(ty, decimal(op, bytes, wide)),
+        UnOp::SwapBytes => wrap(ty, i128::from(known.swap_bytes().cast_unsigned() >> (64 - bytes * 8))),
+        UnOp::IsValidBcd => i64::from((0..bytes * 2).all(|at| wide >> (4 * at) & 15 < 10)),
+        _ => return None,
+    }))
 }
 
 /// One operand.
@@ -135,7 +234,13 @@ pub(super) fn unary(op: UnOp, ty: Option<E>, value: &Const) -> Option<Const> {
         (UnOp::Not, Const::Int(value)) if ty == Some(E::Bool) => Const::Int(i64::from(*value == 0)),
         (UnOp::Not, Const::Int(value)) => Const::Int(wrap(ty?, !widen(ty?, *value))),
         (UnOp::Abs, Const::Int(value)) => Const::Int(wrap(ty?, widen(ty?, *value).abs())),
-        _ => return None,
+        (UnOp::IsValid, Const::F32(value)) => Const::Int(i64::from(value.is_finite())),
+        (UnOp::IsValid, Const::F64(value)) => Const::Int(i64::from(value.is_finite())),
+        (_, Const::Int(value)) => return code(op, ty?, *value),
+        (_, known) => {
+            let ty = ty?;
+            return machine(ops::unary(op, ty.storage().value_type())?, &[self::value(known, ty)?], ty);
+        }
     })
 }
 
@@ -181,4 +286,28 @@ fn float_to_integer(value: f64, to: E, truncates: bool) -> Option<Const> {
     #[expect(clippy::cast_possible_truncation, reason = "the cast saturates and NaN gives 0, as the language says")]
     let number = (rounded as i128).clamp(low, high);
     Some(Const::Int(wrap(to, number)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn digits_are_read_and_made() {
+        assert_eq!(decimal(UnOp::FromBcd, 2, 0x0042), 42);
+        assert_eq!(decimal(UnOp::FromBcd, 8, 0x9999_9999_9999_9999), 9_999_999_999_999_999);
+        // A digit above 9 counts at its place.
+        assert_eq!(decimal(UnOp::FromBcd, 1, 0x1F), 25);
+        assert_eq!(decimal(UnOp::ToBcd, 4, 12_345_678), 0x1234_5678);
+        assert_eq!(code(UnOp::IsValidBcd, E::Word, 0x99A9), Some(Const::Int(0)));
+        assert_eq!(code(UnOp::IsValidBcd, E::Word, 0x9999), Some(Const::Int(1)));
+    }
+
+    #[test]
+    fn bytes_turn_in_their_own_width() {
+        assert_eq!(code(UnOp::SwapBytes, E::Int, 0x0180), Some(Const::Int(-32767)));
+        assert_eq!(code(UnOp::SwapBytes, E::Byte, 0x12), Some(Const::Int(0x12)));
+        assert_eq!(code(UnOp::SwapBytes, E::Dword, 0x1234_5678), Some(Const::Int(0x7856_3412)));
+        assert_eq!(code(UnOp::SwapBytes, E::Lint, -2), Some(Const::Int(i64::from_be_bytes((-2i64).to_le_bytes()))));
+    }
 }

@@ -7,15 +7,18 @@
 //!
 //! A mistake is reported once: what is wrong has the type [`types::Ty::Error`], which fits everywhere.
 
+pub(crate) mod ops;
 pub mod tree;
 pub mod types;
 mod union;
 
+mod bcd;
 mod call;
 mod config;
 mod convert;
 mod declare;
 mod edges;
+mod enabled;
 mod expr;
 mod fold;
 mod init;

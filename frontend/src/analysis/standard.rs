@@ -3,10 +3,12 @@
 use khz_bytecode::container::ElementaryType as E;
 use khz_machine::library::functions::{self, FunctionRow, ResultRule, StandardFunction as F, TypeClass};
 
+use super::enabled::{Arguments, has_member};
 use super::expr::{Checker, broken};
+use super::fold;
 use super::testing::is_test_word;
 use super::tree::{BinOp, Expr, ExprKind, TextOp, UnOp};
-use super::types::{BOOL, Const, DINT, INT, Ty, TyKind, elementary_by_name, is_bits, is_duration, is_integer, is_real};
+use super::types::{BOOL, Const, DINT, INT, Ty, TyKind, elementary_by_name, is_integer, is_real, widen, wrap};
 use crate::diagnostics::{Diagnostic, semantic as names, types as rules};
 use crate::source::Span;
 use crate::syntax::ast::{self, Arg, ArgKind, Ident};
@@ -15,11 +17,9 @@ impl<'a> Checker<'_, 'a> {
     /// A call of a name that is no variable and no unit of the user.
     pub(super) fn standard_call(&mut self, name: &Ident, args: &'a [Arg], span: Span, want: Ty) -> Expr {
         let text = self.an.text(name.symbol);
-        if let Some(row) = functions::find(text) {
-            return self.row_call(row, args, span, want);
-        }
-        if let Some(found) = self.conversion_call(text, args, span) {
-            return found;
+        let given = self.without_enable(args);
+        if let Some(found) = self.known_call(text, &given, span, want) {
+            return self.enable(found, &given, want, span);
         }
         let mut known: Vec<_> = self.an.pou_names.keys().copied().collect();
         known.extend(functions::TABLE.iter().filter_map(|row| self.an.ast.names.lookup_folded(row.name)));
@@ -45,11 +45,28 @@ impl<'a> Checker<'_, 'a> {
         broken(span)
     }
 
+    /// A function of the table, a typed one or a conversion. `None`: it is none of them.
+    fn known_call(&mut self, text: &'a str, args: &Arguments<'a>, span: Span, want: Ty) -> Option<Expr> {
+        if let Some(row) = functions::find(text) {
+            return Some(self.row_call(row, None, args, span, want));
+        }
+        if let Some(found) = self.bcd_call(text, args, span) {
+            return Some(found);
+        }
+        if let Some(found) = self.conversion_call(text, args, span) {
+            return Some(found);
+        }
+        let (row, ty) = self.typed_function(text)?;
+        let want = if row.result == ResultRule::Generic { ty } else { want };
+        let found = self.row_call(row, Some(ty), args, span, want);
+        Some(if row.result == ResultRule::Generic { self.coerce(found, ty) } else { found })
+    }
+
     /// The arguments in the order of the parameters. `None`: it was reported.
-    fn row_arguments(&mut self, row: &FunctionRow, args: &'a [Arg], span: Span) -> Option<Vec<&'a ast::Expr>> {
+    fn row_arguments(&mut self, row: &FunctionRow, args: &Arguments<'a>, span: Span) -> Option<Vec<&'a ast::Expr>> {
         let fixed = row.parameters.len();
         let mut list: Vec<Option<&'a ast::Expr>> = vec![None; fixed];
-        for (position, arg) in args.iter().enumerate() {
+        for (position, arg) in args.list.iter().enumerate() {
             let (at, value) = match &arg.kind {
                 ArgKind::Positional(value) => (Some(position), Some(value)),
                 ArgKind::Input { name, value } => (self.row_position(row, self.an.text(name.symbol)), value.as_ref()),
@@ -98,7 +115,15 @@ impl<'a> Checker<'_, 'a> {
         fits.then(|| row.parameters.len() - 1 + (wanted - base))
     }
 
-    fn row_call(&mut self, row: &'static FunctionRow, args: &'a [Arg], span: Span, want: Ty) -> Expr {
+    /// A call of a row; of a typed name, `typed` is its type.
+    fn row_call(
+        &mut self,
+        row: &'static FunctionRow,
+        typed: Option<Ty>,
+        args: &Arguments<'a>,
+        span: Span,
+        want: Ty,
+    ) -> Expr {
         let Some(given) = self.row_arguments(row, args, span) else { return broken(span) };
         let last = row.parameters.len().saturating_sub(1);
         let compares = row.result == ResultRule::Bool;
@@ -109,10 +134,12 @@ impl<'a> Checker<'_, 'a> {
             let hint = match class {
                 TypeClass::Bool => BOOL,
                 TypeClass::Count => DINT,
+                _ if typed.is_some() => typed.unwrap_or(Ty::Void),
                 _ if compares => values.first().map_or(Ty::Void, |first: &Expr| first.ty),
                 _ => hint,
             };
             let found = self.expr(value, hint);
+            let found = self.typed_argument(row, at, found, typed);
             if found.ty == Ty::Error || !self.check_class(row, &found, class) {
                 return broken(span);
             }
@@ -133,6 +160,11 @@ impl<'a> Checker<'_, 'a> {
         match value.kind {
             ExprKind::Const(_) if value.ty == DINT => value,
             _ if value.ty == Ty::Error => value,
+            ExprKind::Const(Const::Int(known)) => {
+                let wide = self.an.types.elementary(value.ty).map_or(0, |ty| widen(ty, known));
+                let index = wide.clamp(i128::from(i32::MIN), i128::from(i32::MAX));
+                Expr { kind: ExprKind::Const(Const::Int(wrap(E::Dint, index))), ty: DINT, span }
+            }
             _ => Expr { kind: ExprKind::ToIndex(Box::new(value)), ty: DINT, span },
         }
     }
@@ -145,7 +177,6 @@ impl<'a> Checker<'_, 'a> {
 
     fn check_class(&mut self, row: &FunctionRow, value: &Expr, class: TypeClass) -> bool {
         let elementary = self.an.types.elementary(value.ty);
-        let number = |ty: E| is_integer(ty) || is_real(ty);
         let is_enum = self.is_enum(value.ty);
         let fits = match (class, value.ty) {
             (TypeClass::AnyElementary, Ty::Str(_) | Ty::IntLit | Ty::RealLit) => true,
@@ -155,16 +186,14 @@ impl<'a> Checker<'_, 'a> {
             (TypeClass::Array, ty) => {
                 matches!(self.an.types.kind(ty), Some(TyKind::Array { .. } | TyKind::Open { .. }))
             }
+            (TypeClass::Float, Ty::RealLit) => true,
+            (TypeClass::Float, Ty::IntLit) => false,
             (_, Ty::IntLit) => true,
             (TypeClass::AnyMagnitude | TypeClass::AnyNum | TypeClass::AnyReal, Ty::RealLit) => true,
             _ if is_enum => false,
-            (TypeClass::AnyMagnitude, _) => elementary.is_some_and(|ty| number(ty) || is_duration(ty) || is_bits(ty)),
-            (TypeClass::AnyNum, _) => elementary.is_some_and(|ty| number(ty) || is_bits(ty)),
-            (TypeClass::AnyReal, _) => elementary.is_some_and(number),
-            (TypeClass::AnyInt | TypeClass::Count | TypeClass::Shiftable, _) => {
-                elementary.is_some_and(|ty| is_integer(ty) || is_bits(ty))
-            }
-            (TypeClass::AnyBit, _) => elementary.is_some_and(|ty| ty == E::Bool || is_bits(ty) || is_integer(ty)),
+            // An integer becomes a float here.
+            (TypeClass::AnyReal, _) => elementary.is_some_and(|ty| is_integer(ty) || is_real(ty)),
+            _ => elementary.is_some_and(|ty| has_member(class, ty)),
         };
         if !fits {
             let message = format!("{} takes {} here, not {}", row.name, class.describe(), self.an.types.name(value.ty));
@@ -224,7 +253,14 @@ impl<'a> Checker<'_, 'a> {
                 let value = self.settle(value, Ty::Void);
                 self.convert(value, wanted, true)
             }
-            F::Move => values.pop().map_or_else(|| broken(span), |value| self.settle(value, want)),
+            F::ToBigEndian | F::BigEndianTo | F::ToLittleEndian | F::LittleEndianTo | F::IsValid | F::IsValidBcd => {
+                self.code_call(row.function, values, span, want)
+            }
+            F::Move => {
+                let Some(value) = values.pop() else { return broken(span) };
+                let value = self.settle(value, want);
+                self.itself(value, span)
+            }
             F::Shl | F::Shr | F::Rol | F::Ror => self.shift(row.function, values, span, want),
             F::LowerBound | F::UpperBound => match values.as_slice() {
                 [array, dim] => self.array_bound(array, dim, row.function == F::UpperBound, span),
@@ -356,6 +392,30 @@ impl<'a> Checker<'_, 'a> {
         self.unary_op(op, value, span)
     }
 
+    /// A value that a function gives as it is: it stands where the call does, and what traps in it where that stands.
+    fn itself(&self, value: Expr, span: Span) -> Expr {
+        let ty = value.ty;
+        match value.kind {
+            ExprKind::Const(_) => Expr { span, ..value },
+            _ if self.an.types.storage(ty).is_none() => value,
+            _ => Expr { kind: ExprKind::Convert { value: Box::new(value), truncates: false }, ty, span },
+        }
+    }
+
+    /// Byte order and validity. The machine's own order is the little-endian one.
+    fn code_call(&mut self, function: F, mut values: Vec<Expr>, span: Span, want: Ty) -> Expr {
+        let Some(value) = values.pop() else { return broken(span) };
+        let value = self.settle(value, want);
+        let (op, ty) = match function {
+            _ if value.ty == Ty::Error => return broken(span),
+            F::ToLittleEndian | F::LittleEndianTo => return self.itself(value, span),
+            F::ToBigEndian | F::BigEndianTo => (UnOp::SwapBytes, self.an.types.without_range(value.ty)),
+            F::IsValid => (UnOp::IsValid, BOOL),
+            _ => (UnOp::IsValidBcd, BOOL),
+        };
+        Expr { ty, ..self.unary_op(op, value, span) }
+    }
+
     fn shift(&mut self, function: F, mut values: Vec<Expr>, span: Span, want: Ty) -> Expr {
         let (Some(count), Some(value)) = (values.pop(), values.pop()) else { return broken(span) };
         let value = self.settle(value, want);
@@ -369,6 +429,12 @@ impl<'a> Checker<'_, 'a> {
             return broken(span);
         }
         let ty = self.an.types.without_range(value.ty);
+        if let (ExprKind::Const(x), ExprKind::Const(y), Some(elementary)) =
+            (&value.kind, &count.kind, self.an.types.elementary(ty))
+            && let Some(folded) = fold::shift(op, elementary, x, y)
+        {
+            return Expr { kind: ExprKind::Const(folded), ty, span };
+        }
         Expr { kind: ExprKind::Binary(op, Box::new(value), Box::new(count)), ty, span }
     }
 
@@ -402,6 +468,9 @@ impl<'a> Checker<'_, 'a> {
         if selector.ty == Ty::Error || values.iter().any(|value| value.ty == Ty::Error) {
             return broken(span);
         }
+        if let Some(chosen) = chosen(function, &selector, &values) {
+            return Expr { kind: ExprKind::Const(chosen), ty, span };
+        }
         if function == F::Mux {
             values.insert(0, selector);
             return Expr { kind: ExprKind::Mux(values), ty, span };
@@ -431,7 +500,7 @@ impl<'a> Checker<'_, 'a> {
             _ => (TextOp::Concat, Ty::Str(sum)),
         };
         if op != TextOp::Concat {
-            return Expr { kind: ExprKind::Text(op, values), ty, span };
+            return text(op, values, ty, span);
         }
         let mut found: Option<Expr> = None;
         for value in values {
@@ -440,7 +509,7 @@ impl<'a> Checker<'_, 'a> {
                 Some(before) => {
                     let length = (capacity(&before) + capacity(&value)).min(khz_bytecode::limits::MAX_STRING_LENGTH);
                     let ty = Ty::Str(u16::try_from(length).unwrap_or(u16::MAX));
-                    Expr { kind: ExprKind::Text(TextOp::Concat, vec![before, value]), ty, span }
+                    text(TextOp::Concat, vec![before, value], ty, span)
                 }
             });
         }
@@ -448,14 +517,15 @@ impl<'a> Checker<'_, 'a> {
     }
 
     /// `INT_TO_REAL(x)`, `TO_REAL(x)`, `Color_TO_INT(x)`, `TO_Color(x)`. `None`: the name is no conversion.
-    fn conversion_call(&mut self, text: &'a str, args: &'a [Arg], span: Span) -> Option<Expr> {
+    fn conversion_call(&mut self, text: &'a str, args: &Arguments<'a>, span: Span) -> Option<Expr> {
         let shape = functions::conversion(text)?;
         let to = self.conversion_type(shape.to, span)?;
         let from = match shape.from {
             Some(from) => Some(self.conversion_type(from, span)?),
             None => None,
         };
-        let [Arg { kind: ArgKind::Positional(value) | ArgKind::Input { value: Some(value), .. }, .. }] = args else {
+        let [Arg { kind: ArgKind::Positional(value) | ArgKind::Input { value: Some(value), .. }, .. }] = args.list[..]
+        else {
             self.an.report(&names::ARGUMENT_COUNT, span, format!("{text} takes 1 argument"));
             return Some(broken(span));
         };
@@ -513,7 +583,8 @@ impl<'a> Checker<'_, 'a> {
                         None => value.ty,
                     };
                     let found = self.convert(Expr { ty, ..value }, target, truncates);
-                    self.retype(Expr { span, ..found }, to)
+                    let found = if ty == Ty::Elem(target) { self.itself(found, span) } else { Expr { span, ..found } };
+                    self.retype(found, to)
                 }
                 _ => {
                     let message = format!("{} can not be converted", self.an.types.name(value.ty));
@@ -539,5 +610,24 @@ impl<'a> Checker<'_, 'a> {
             Const::Int(value) => Some(super::types::widen(self.an.types.elementary(ty)?, *value)),
             _ => None,
         }
+    }
+}
+
+/// What SEL or MUX gives when all is known.
+fn chosen(function: F, selector: &Expr, values: &[Expr]) -> Option<Const> {
+    let ExprKind::Const(Const::Int(selector)) = &selector.kind else { return None };
+    let at =
+        if function == F::Mux { usize::try_from(*selector).unwrap_or(usize::MAX) } else { usize::from(*selector != 0) };
+    let known: Option<Vec<&Const>> =
+        values.iter().map(|value| if let ExprKind::Const(known) = &value.kind { Some(known) } else { None }).collect();
+    let known = known?;
+    known.get(at).or(known.last()).map(|known| (*known).clone())
+}
+
+/// An operation on strings, computed when all is known.
+fn text(op: TextOp, values: Vec<Expr>, ty: Ty, span: Span) -> Expr {
+    match fold::text(op, &values) {
+        Some(known) => Expr { kind: ExprKind::Const(known), ty, span },
+        None => Expr { kind: ExprKind::Text(op, values), ty, span },
     }
 }

@@ -460,6 +460,19 @@ pub enum ExprKind {
     Text(TextOp, Vec<Expr>),
     /// A bound of the array that stands for an open one ([`TyKind::Open`](super::types::TyKind)): dimension from 0, upper or lower.
     Bound(TyId, usize, bool),
+    /// A standard function that is called with EN or ENO.
+    Enabled(Box<Enabled>),
+}
+
+/// A value that is computed only when it is enabled; else it is what a variable of its type begins with.
+#[derive(Debug, Clone)]
+pub struct Enabled {
+    /// EN; absent: TRUE.
+    pub en: Option<Expr>,
+    /// ENO: gets EN.
+    pub eno: Option<Place>,
+    /// The value.
+    pub value: Expr,
 }
 
 /// Operators with one operand.
@@ -478,6 +491,16 @@ pub enum UnOp {
     Asin,
     Acos,
     Atan,
+    /// The bytes in reverse order.
+    SwapBytes,
+    /// The number that a bit string holds as binary coded decimals, as the unsigned integer of the same width.
+    FromBcd,
+    /// The digits of an unsigned integer that has no more of them than the bit string of the same width.
+    ToBcd,
+    /// Whether a float is no NaN and no infinity.
+    IsValid,
+    /// Whether every digit of a bit string is 0 to 9.
+    IsValidBcd,
 }
 
 /// Operators with two operands.

@@ -9,8 +9,8 @@ use khz_bytecode::value::{BytePlace, LocalType, SlotPlace, Storage, ValueType};
 
 use super::Builder;
 use super::emit::Emitter;
-use super::ops;
 use super::place::{Address, Home};
+use crate::analysis::ops;
 use crate::analysis::tree::{BinOp, CaseArm, Expr, ExprKind, ForStmt, Place, PouId, Stmt, StmtKind, VarId};
 use crate::analysis::types::{Const, Ty, TyKind, integer_type};
 use crate::source::Span;

@@ -6,8 +6,9 @@ use khz_bytecode::value::{BytePlace, LocalType, RefType, SlotPlace, Storage};
 
 use super::body::{CallContext, FunctionBuilder};
 use super::place::{Address, Home};
-use crate::analysis::tree::{Call, Expr, ExprKind, PouInfo, Stmt, StmtKind, VarClass, VarId};
+use crate::analysis::tree::{Call, Enabled, Expr, ExprKind, Place, PouInfo, Stmt, StmtKind, VarClass, VarId};
 use crate::analysis::types::{Const, Ty, Value};
+use crate::source::Span;
 
 impl FunctionBuilder<'_, '_> {
     /// A call for its effects.
@@ -23,20 +24,48 @@ impl FunctionBuilder<'_, '_> {
 
     /// A call for its result: a scalar on the stack, or a reference to a temporary.
     pub(super) fn call_value(&mut self, call: &Call, ty: Ty) {
-        let Some(en) = &call.en else {
-            self.function_call(call);
-            self.eno(call, true);
+        self.when_enabled(call.en.as_ref(), ty, &mut |this, is_enabled| {
+            if is_enabled {
+                this.function_call(call);
+            }
+            if !(is_enabled && call.eno_is_given) {
+                this.eno(call.eno.as_ref(), is_enabled, call.span);
+            }
+        });
+    }
+
+    /// A standard function with EN or ENO: its value as [`Self::call_value`] leaves it.
+    pub(super) fn enabled_value(&mut self, enabled: &Enabled, whole: &Expr) {
+        let ty = whole.ty;
+        let room = if self.b.project.types.storage(ty).is_none() { Some(self.temporary(ty)) } else { None };
+        self.when_enabled(enabled.en.as_ref(), ty, &mut |this, is_enabled| {
+            match room {
+                _ if !is_enabled => {}
+                None => this.value(&enabled.value),
+                // Where it is, the other way must leave it too.
+                Some(offset) => {
+                    this.push_address(BytePlace::Frame, offset, ty);
+                    this.assign_text_from(&enabled.value, ty);
+                    this.push_address(BytePlace::Frame, offset, ty);
+                }
+            }
+            this.eno(enabled.eno.as_ref(), is_enabled, whole.span);
+        });
+    }
+
+    /// What `make` leaves when it is told TRUE; not enabled, what a variable of the type begins with.
+    fn when_enabled(&mut self, en: Option<&Expr>, ty: Ty, make: &mut dyn FnMut(&mut Self, bool)) {
+        let Some(en) = en else {
+            make(self, true);
             return;
         };
-        // Not enabled, the function gives what a variable of the type begins with.
         let skip = self.e.label();
         let end = self.e.label();
         self.jump_when(en, skip, false);
-        self.function_call(call);
-        self.eno(call, true);
+        make(self, true);
         self.e.push(I::Jump { target: end }, 0, 0);
         self.e.bind(skip);
-        self.eno(call, false);
+        make(self, false);
         let default = self.b.project.types.default(ty);
         if self.b.project.types.storage(ty).is_some() {
             let elementary = self.elementary(ty);
@@ -59,11 +88,11 @@ impl FunctionBuilder<'_, '_> {
         self.e.bind(end);
     }
 
-    /// Says whether a call inside an expression was made, where nothing else says it: [`Call::eno_is_given`].
-    fn eno(&mut self, call: &Call, was_made: bool) {
-        let Some(target) = call.eno.clone().filter(|_| !(was_made && call.eno_is_given)) else { return };
-        let value = Expr { kind: ExprKind::Const(Const::Int(i64::from(was_made))), ty: target.ty, span: call.span };
-        self.statement(&Stmt { kind: StmtKind::Assign { target, value }, span: call.span });
+    /// Says whether what stands inside an expression was computed.
+    fn eno(&mut self, eno: Option<&Place>, was_made: bool, span: Span) {
+        let Some(target) = eno.cloned() else { return };
+        let value = Expr { kind: ExprKind::Const(Const::Int(i64::from(was_made))), ty: target.ty, span };
+        self.statement(&Stmt { kind: StmtKind::Assign { target, value }, span });
     }
 
     /// Calls a function. Leaves its result: `None` when it has none.

@@ -6,8 +6,8 @@ use khz_bytecode::instruction::{Instruction as I, NumericOp as N};
 use khz_bytecode::value::{IntegerType, SlotPlace, ValueType};
 
 use super::body::{FunctionBuilder, Kept};
-use super::ops;
 use crate::analysis::NS_PER_MS;
+use crate::analysis::ops;
 use crate::analysis::tree::{BinOp, Expr, ExprKind, TextOp, UnOp};
 use crate::analysis::types::{Const, Ty, TyKind, integer_type, is_duration, is_real, is_signed, limits};
 
@@ -95,6 +95,7 @@ impl FunctionBuilder<'_, '_> {
             }
             ExprKind::Mux(parts) => self.mux(parts),
             ExprKind::Call(call) => self.call_value(call, expr.ty),
+            ExprKind::Enabled(enabled) => self.enabled_value(enabled, expr),
             ExprKind::Keep(value) => {
                 self.value(value);
                 let slot = self.scratch(ty.storage());
@@ -158,6 +159,11 @@ impl FunctionBuilder<'_, '_> {
             UnOp::Not if ty == E::Bool => self.numeric(N::I32Eqz),
             // The absolute value of an unsigned number is the number.
             UnOp::Abs if !is_real(ty) && !is_signed(ty) && !is_duration(ty) => {}
+            UnOp::SwapBytes => self.swap_bytes(ty),
+            UnOp::FromBcd => self.digits_to_number(ty),
+            UnOp::ToBcd => self.number_to_digits(ty),
+            UnOp::IsValid => self.is_valid(ty),
+            UnOp::IsValidBcd => self.is_valid_bcd(ty),
             _ => {
                 if let Some(op) = ops::unary(op, ty.storage().value_type()) {
                     self.numeric(op);

@@ -9,12 +9,12 @@
 
 mod body;
 mod call;
+mod codes;
 mod emit;
 mod expr;
 mod layout;
 mod memory;
 mod open;
-mod ops;
 mod place;
 mod resource;
 mod text;

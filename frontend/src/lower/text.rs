@@ -4,6 +4,7 @@ use khz_bytecode::instruction::{HelperOp as H, Instruction as I, MAX_CAPACITIES,
 use khz_bytecode::value::{BytePlace, SlotPlace, Storage};
 
 use super::body::{FunctionBuilder, Kept};
+use crate::analysis::ops;
 use crate::analysis::tree::{BinOp, Expr, ExprKind, Place, TextOp};
 use crate::analysis::types::{Const, Ty, is_duration, is_real, is_signed};
 use khz_bytecode::container::ElementaryType as E;
@@ -25,6 +26,7 @@ impl FunctionBuilder<'_, '_> {
                 self.push_address(BytePlace::Data, offset, ty);
             }
             ExprKind::Call(call) => self.call_value(call, expr.ty),
+            ExprKind::Enabled(enabled) => self.enabled_value(enabled, expr),
             ExprKind::Text(op, parts) => {
                 let offset = self.temporary(expr.ty);
                 self.push_address(BytePlace::Frame, offset, expr.ty);
@@ -135,13 +137,6 @@ impl FunctionBuilder<'_, '_> {
     fn text_operation(&mut self, op: TextOp, parts: &[Expr], ty: Ty) {
         let to = Some(capacity(ty));
         match op {
-            TextOp::Left => self.text_helper(H::StringLeft, parts, to),
-            TextOp::Right => self.text_helper(H::StringRight, parts, to),
-            TextOp::Mid => self.text_helper(H::StringMid, parts, to),
-            TextOp::Concat => self.text_helper(H::StringConcat, parts, to),
-            TextOp::Insert => self.text_helper(H::StringInsert, parts, to),
-            TextOp::Delete => self.text_helper(H::StringDelete, parts, to),
-            TextOp::Replace => self.text_helper(H::StringReplace, parts, to),
             TextOp::From => {
                 let Some(value) = parts.first() else { return };
                 let from = self.elementary(value.ty);
@@ -163,7 +158,11 @@ impl FunctionBuilder<'_, '_> {
                 debug_assert!(!is_real(from) || matches!(helper, H::StringFromF32 | H::StringFromF64));
                 self.helper(helper, &[capacity(ty)]);
             }
-            TextOp::Len | TextOp::Find | TextOp::To => {}
+            _ => {
+                if let Some(helper) = ops::text(op) {
+                    self.text_helper(helper, parts, to);
+                }
+            }
         }
     }
 
@@ -191,7 +190,7 @@ impl FunctionBuilder<'_, '_> {
         self.value(b);
         self.helper(H::StringCompare, &[capacity(a.ty), capacity(b.ty)]);
         self.i32_const(0);
-        if let Some(op) = super::ops::binary(op, E::Dint) {
+        if let Some(op) = ops::binary(op, E::Dint) {
             self.numeric(op);
         }
     }

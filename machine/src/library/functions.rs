@@ -18,6 +18,12 @@ pub enum TypeClass {
     AnyInt,
     /// BOOL and bit strings.
     AnyBit,
+    /// BYTE, WORD, DWORD and LWORD.
+    BitString,
+    /// REAL and LREAL and nothing that would become one.
+    Float,
+    /// What lies in memory as a whole number: integers, bit strings, BOOL and durations.
+    Bytes,
     /// Bit strings and integers that can be shifted; BOOL not.
     Shiftable,
     /// Strings.
@@ -47,6 +53,9 @@ impl TypeClass {
             TypeClass::AnyReal => "a REAL or LREAL",
             TypeClass::AnyInt => "an integer",
             TypeClass::AnyBit => "a BOOL or bit string",
+            TypeClass::BitString => "a BYTE, WORD, DWORD or LWORD",
+            TypeClass::Float => "a REAL or LREAL",
+            TypeClass::Bytes => "an integer, bit string or duration",
             TypeClass::Shiftable => "a bit string or integer",
             TypeClass::AnyString => "a STRING",
             TypeClass::Bool => "a BOOL",
@@ -173,12 +182,54 @@ functions! {
     (LowerBound "LOWER_BOUND" ["ARR" Array, "DIM" Count] -> Dint, "The lowest index of dimension DIM, counted from 1.", "table 15"),
     (UpperBound "UPPER_BOUND" ["ARR" Array, "DIM" Count] -> Dint, "The highest index of dimension DIM, counted from 1.", "table 15"),
     (Find "FIND" ["IN1" AnyString, "IN2" AnyString] -> Int, "Position of IN2 in IN1, 0 if it is not there.", "table 34"),
+    (ToBigEndian "TO_BIG_ENDIAN" ["IN" Bytes] -> Generic, "The bytes in the order of a big-endian peer.", "table 37"),
+    (ToLittleEndian "TO_LITTLE_ENDIAN" ["IN" Bytes] -> Generic, "The bytes in the order of a little-endian peer, which is that of the machine.", "table 37"),
+    (BigEndianTo "BIG_ENDIAN_TO" ["IN" Bytes] -> Generic, "The value of bytes that stand in big-endian order.", "table 37"),
+    (LittleEndianTo "LITTLE_ENDIAN_TO" ["IN" Bytes] -> Generic, "The value of bytes that stand in little-endian order, which is that of the machine.", "table 37"),
+    (IsValid "IS_VALID" ["IN" Float] -> Bool, "Whether it is a number: no NaN and no infinity.", "table 39"),
+    (IsValidBcd "IS_VALID_BCD" ["IN" BitString] -> Bool, "Whether every digit of a BCD number is 0 to 9.", "table 39"),
 }
 
 /// The row of a name, in any case.
 #[must_use]
 pub fn find(name: &str) -> Option<&'static FunctionRow> {
     TABLE.iter().find(|row| row.name.eq_ignore_ascii_case(name))
+}
+
+/// The row and the type of a typed function's name (IEC 61131-3 table 21): `ADD_INT`, `GT_DINT`, `SEL_REAL`. Whether the row takes the
+/// type is for the caller to say. `name` is in upper case.
+#[must_use]
+pub fn typed(name: &str) -> Option<(&'static FunctionRow, &str)> {
+    let (row, ty) = name.rsplit_once('_')?;
+    Some((find(row)?, ty))
+}
+
+/// The parts of the name of a conversion from or to binary coded decimals (IEC 61131-3 table 22).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct BcdConversion<'n> {
+    /// Name of the source type; absent in `BCD_TO_UINT` and `TO_BCD_WORD`.
+    pub from: Option<&'n str>,
+    /// Name of the target type.
+    pub to: &'n str,
+    /// Whether the digits are the result: `UINT_TO_BCD_WORD`.
+    pub makes_digits: bool,
+}
+
+/// Takes the name of a conversion of binary coded decimals apart: `WORD_BCD_TO_UINT`, `BCD_TO_UINT`, `UINT_TO_BCD_WORD`, `TO_BCD_WORD`.
+/// Whether the parts are types that fit is for the caller to say. `name` is in upper case.
+#[must_use]
+pub fn bcd_conversion(name: &str) -> Option<BcdConversion<'_>> {
+    if let Some(to) = name.strip_prefix("BCD_TO_") {
+        return Some(BcdConversion { from: None, to, makes_digits: false });
+    }
+    if let Some(to) = name.strip_prefix("TO_BCD_") {
+        return Some(BcdConversion { from: None, to, makes_digits: true });
+    }
+    if let Some((from, to)) = name.split_once("_BCD_TO_") {
+        return Some(BcdConversion { from: Some(from), to, makes_digits: false });
+    }
+    let (from, to) = name.split_once("_TO_BCD_")?;
+    Some(BcdConversion { from: Some(from), to, makes_digits: true })
 }
 
 /// The parts of a conversion's name.
@@ -227,6 +278,25 @@ mod tests {
         assert_eq!(conversion("TO_TIME"), Some(Conversion { from: None, to: "TIME", truncates: false }));
         assert_eq!(conversion("REAL_TRUNC_INT"), Some(Conversion { from: Some("REAL"), to: "INT", truncates: true }));
         assert_eq!(conversion("SQRT"), None);
+    }
+
+    #[test]
+    fn typed_names_are_taken_apart() {
+        assert_eq!(typed("ADD_INT").map(|(row, ty)| (row.function, ty)), Some((StandardFunction::Add, "INT")));
+        let endian = typed("TO_BIG_ENDIAN_DWORD").map(|(row, ty)| (row.function, ty));
+        assert_eq!(endian, Some((StandardFunction::ToBigEndian, "DWORD")));
+        assert!(typed("ADD").is_none());
+        assert!(typed("PLUS_INT").is_none());
+    }
+
+    #[test]
+    fn conversions_of_decimals_are_taken_apart() {
+        let parts = |name| bcd_conversion(name).map(|found| (found.from, found.to, found.makes_digits));
+        assert_eq!(parts("WORD_BCD_TO_UINT"), Some((Some("WORD"), "UINT", false)));
+        assert_eq!(parts("BCD_TO_UINT"), Some((None, "UINT", false)));
+        assert_eq!(parts("UINT_TO_BCD_WORD"), Some((Some("UINT"), "WORD", true)));
+        assert_eq!(parts("TO_BCD_WORD"), Some((None, "WORD", true)));
+        assert_eq!(parts("UINT_TO_WORD"), None);
     }
 
     #[test]

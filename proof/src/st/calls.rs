@@ -3,23 +3,9 @@
 use khz_machine::library::functions::{FunctionRow, ResultRule, TABLE, TypeClass};
 
 use super::expression::{boxed, lit};
-use super::functions::{Function, compares, row};
+use super::functions::{Function, compares, row, takes};
 use super::generate::Generator;
 use super::tree::{Class, Expr, ExprKind, Kind, Op, Ty, UnitKind, Value};
-
-/// Whether a parameter of a class takes a type.
-fn takes(class: TypeClass, kind: Kind) -> bool {
-    match class {
-        TypeClass::AnyElementary => true,
-        TypeClass::AnyMagnitude => kind != Kind::Bool,
-        TypeClass::AnyNum => kind.is_integer() || kind.is_bits() || kind.is_real(),
-        TypeClass::AnyReal => kind.is_real(),
-        TypeClass::AnyInt | TypeClass::Shiftable | TypeClass::Count => kind.is_integer() || kind.is_bits(),
-        TypeClass::AnyBit => kind == Kind::Bool || kind.is_integer() || kind.is_bits(),
-        TypeClass::Bool => kind == Kind::Bool,
-        TypeClass::AnyString | TypeClass::Array => false,
-    }
-}
 
 /// Whether a function can give a type.
 fn gives(row: &FunctionRow, kind: Kind) -> bool {
@@ -53,6 +39,12 @@ impl Generator {
         let function = row.function;
         match function {
             _ if compares(function) => self.comparison(row, depth),
+            Function::IsValid | Function::IsValidBcd => {
+                let class = row.parameters[0].class;
+                let kinds: Vec<Kind> = Kind::ALL.into_iter().filter(|kind| takes(class, *kind)).collect();
+                let of = self.r.pick(&kinds).copied().unwrap_or(kind);
+                std(kind, function, vec![self.expr(of, depth)])
+            }
             Function::Len => std(kind, function, vec![self.string(depth)]),
             Function::Find => {
                 let wanted = self.r.one_of([&b"a"[..], b"1", b"ab", b"A0", b"", b".", b"1.0"]).to_vec();

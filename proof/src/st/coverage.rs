@@ -7,7 +7,8 @@ use super::generate::Size;
 use super::tree::{Arg, Base, Class, Def, ExprKind, Kind, Op, Source, Step, Stmt, Ty, UnitKind};
 use super::visit::{Node, each};
 use crate::campaign::Figures;
-use khz_machine::library::{self, functions::TABLE};
+use khz_machine::library;
+use khz_machine::library::functions::{ResultRule, TABLE};
 
 /// Counts of programs, by what they hold.
 #[derive(Debug, Clone, Default)]
@@ -57,7 +58,7 @@ impl Found {
             Node::Stmt(stmt) => self.stmt(source, stmt),
             Node::Expr(expr) => match &expr.kind {
                 ExprKind::Std(function, inputs) => {
-                    let ty = if super::functions::compares(*function) { inputs[0].ty } else { expr.ty };
+                    let ty = if row(*function).result == ResultRule::Bool { inputs[0].ty } else { expr.ty };
                     self.functions.insert((row(*function).name, name(source, ty)));
                 }
                 ExprKind::Conv(inner) | ExprKind::Trunc(inner) => {

@@ -2,7 +2,7 @@
 
 use khz_bytecode::trap::TrapCode;
 pub use khz_machine::library::functions::StandardFunction as Function;
-use khz_machine::library::functions::{FunctionRow, TABLE};
+use khz_machine::library::functions::{FunctionRow, TABLE, TypeClass};
 
 use super::tree::{Kind, Op, Value};
 
@@ -13,6 +13,23 @@ use super::tree::{Kind, Op, Value};
 #[must_use]
 pub fn row(function: Function) -> &'static FunctionRow {
     TABLE.iter().find(|row| row.function == function).expect("every function has a row")
+}
+
+/// Whether a parameter of a class takes a type.
+#[must_use]
+pub fn takes(class: TypeClass, kind: Kind) -> bool {
+    match class {
+        TypeClass::AnyElementary => true,
+        TypeClass::AnyMagnitude => kind != Kind::Bool,
+        TypeClass::AnyNum => kind.is_integer() || kind.is_bits() || kind.is_real(),
+        TypeClass::AnyReal | TypeClass::Float => kind.is_real(),
+        TypeClass::BitString => kind.is_bits(),
+        TypeClass::Bytes => !kind.is_real(),
+        TypeClass::AnyInt | TypeClass::Shiftable | TypeClass::Count => kind.is_integer() || kind.is_bits(),
+        TypeClass::AnyBit => kind == Kind::Bool || kind.is_integer() || kind.is_bits(),
+        TypeClass::Bool => kind == Kind::Bool,
+        TypeClass::AnyString | TypeClass::Array => false,
+    }
 }
 
 fn less(a: &Value, b: &Value) -> bool {
@@ -182,6 +199,11 @@ fn shift(function: Function, kind: Kind, value: i128, count: i128) -> i128 {
     }
 }
 
+/// The bytes of a value in reverse order, as a number without sign.
+fn reversed(kind: Kind, value: i128) -> i128 {
+    (0..kind.bits().div_ceil(8)).fold(0, |sum, at| sum << 8 | (value >> (8 * at) & 0xFF))
+}
+
 /// A function of one float.
 fn float(function: Function, value: &Value) -> Option<Value> {
     macro_rules! table {
@@ -280,7 +302,14 @@ pub fn standard(function: Function, kind: Kind, values: &[Value]) -> Result<Opti
         Function::Shl | Function::Shr | Function::Rol | Function::Ror => {
             Value::Int(kind.wrap(shift(function, kind, values[0].int(), values[1].int())))
         }
-        Function::Move => values[0].clone(),
+        Function::Move | Function::ToLittleEndian | Function::LittleEndianTo => values[0].clone(),
+        Function::ToBigEndian | Function::BigEndianTo => Value::Int(kind.wrap(reversed(kind, values[0].int()))),
+        Function::IsValid => Value::Int(i128::from(match &values[0] {
+            Value::Real(value) => value.is_finite(),
+            Value::Lreal(value) => value.is_finite(),
+            other => panic!("IS_VALID of {other:?}"),
+        })),
+        Function::IsValidBcd => Value::Int(i128::from(!format!("{:X}", values[0].int()).contains(|c| c > '9'))),
         _ => return Ok(super::text::function(function, values)),
     }))
 }

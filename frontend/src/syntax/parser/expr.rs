@@ -110,7 +110,7 @@ impl Parser<'_> {
         let op = match self.kind() {
             TokenKind::Minus => UnaryOp::Neg,
             TokenKind::Plus => UnaryOp::Plus,
-            TokenKind::Keyword(Keyword::Not) => UnaryOp::Not,
+            TokenKind::Keyword(Keyword::Not) if !self.at_formal_not() => UnaryOp::Not,
             TokenKind::Foreign if self.slice(self.span()) == "!" => {
                 self.report_foreign("!", "NOT");
                 UnaryOp::Not
@@ -122,6 +122,19 @@ impl Parser<'_> {
         let below = self.height(&operand);
         let span = op_span.to(operand.span);
         self.expr_node(below, span, ExprKind::Unary { op, op_span, operand: Box::new(operand) })
+    }
+
+    /// Whether `NOT` is called as the function that it is too, with the names of its parameters: `NOT(IN := x)`. Another name before `:=` is
+    /// a comparison gone wrong.
+    fn at_formal_not(&self) -> bool {
+        self.at_keyword(Keyword::Not)
+            && self.kind_at(1) == TokenKind::LeftParen
+            && (self.kind_at(2), self.kind_at(3)) == (TokenKind::Ident, TokenKind::Assign)
+            && ["IN", "EN"].iter().any(|name| {
+                let token = self.token_at(2);
+                let text = self.text.get(token.start as usize..token.end as usize);
+                text.is_some_and(|text| text.eq_ignore_ascii_case(name))
+            })
     }
 
     /// `postfix = primary { '.' member | '[' expression { ',' expression } ']' | '^' | '(' arguments ')' }`.
@@ -291,6 +304,10 @@ impl Parser<'_> {
             TokenKind::Keyword(Keyword::And | Keyword::Or | Keyword::Xor | Keyword::Mod)
                 if self.kind_at(1) == TokenKind::LeftParen =>
             {
+                let name = self.take_name();
+                self.expr_node(0, name.span, ExprKind::Name(name))
+            }
+            TokenKind::Keyword(Keyword::Not) if self.at_formal_not() => {
                 let name = self.take_name();
                 self.expr_node(0, name.span, ExprKind::Name(name))
             }

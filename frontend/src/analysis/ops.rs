@@ -1,14 +1,14 @@
-//! Which instruction an operation is.
+//! Which instruction an operation is: the folding computes with it, the lowering emits it.
 
 use khz_bytecode::container::ElementaryType as E;
-use khz_bytecode::instruction::NumericOp as N;
+use khz_bytecode::instruction::{HelperOp as H, NumericOp as N};
 use khz_bytecode::value::{IntegerType, ValueType};
 
-use crate::analysis::tree::{BinOp, UnOp};
-use crate::analysis::types::integer_type;
+use super::tree::{BinOp, TextOp, UnOp};
+use super::types::integer_type;
 
 /// One operand.
-pub(super) fn unary(op: UnOp, ty: ValueType) -> Option<N> {
+pub(crate) fn unary(op: UnOp, ty: ValueType) -> Option<N> {
     use ValueType::{F32, F64, I32, I64};
     Some(match (op, ty) {
         (UnOp::Neg, I32) => N::I32Neg,
@@ -46,7 +46,7 @@ pub(super) fn unary(op: UnOp, ty: ValueType) -> Option<N> {
 }
 
 /// Two operands, of the type that decides width and sign.
-pub(super) fn binary(op: BinOp, ty: E) -> Option<N> {
+pub(crate) fn binary(op: BinOp, ty: E) -> Option<N> {
     match ty {
         E::Real => float32(op),
         E::Lreal => float64(op),
@@ -108,8 +108,24 @@ float_table!(float32, Add F32Add, Sub F32Sub, Mul F32Mul, Div F32Div, Pow F32Pow
 float_table!(float64, Add F64Add, Sub F64Sub, Mul F64Mul, Div F64Div, Pow F64Pow, Atan2 F64Atan2, Min F64Min, Max F64Max,
     Eq F64Eq, Ne F64Ne, Lt F64Lt, Le F64Le, Gt F64Gt, Ge F64Ge);
 
+/// A string operation; `None` for conversions, which hang on the type.
+pub(crate) fn text(op: TextOp) -> Option<H> {
+    Some(match op {
+        TextOp::Len => H::StringLen,
+        TextOp::Find => H::StringFind,
+        TextOp::Left => H::StringLeft,
+        TextOp::Right => H::StringRight,
+        TextOp::Mid => H::StringMid,
+        TextOp::Concat => H::StringConcat,
+        TextOp::Insert => H::StringInsert,
+        TextOp::Delete => H::StringDelete,
+        TextOp::Replace => H::StringReplace,
+        TextOp::From | TextOp::To => return None,
+    })
+}
+
 /// REAL or LREAL to an integer: rounded to nearest even, or cut.
-pub(super) fn float_to_integer(from: ValueType, to: IntegerType, truncates: bool) -> N {
+pub(crate) fn float_to_integer(from: ValueType, to: IntegerType, truncates: bool) -> N {
     use IntegerType::{I8, I16, I32, I64, U8, U16, U32, U64};
     match (from == ValueType::F32, truncates, to) {
         (true, false, I8) => N::F32RoundI8,
@@ -148,7 +164,7 @@ pub(super) fn float_to_integer(from: ValueType, to: IntegerType, truncates: bool
 }
 
 /// An integer to REAL or LREAL. Narrow unsigned numbers are positive in 32 bits.
-pub(super) fn integer_to_float(from: IntegerType, to: ValueType) -> N {
+pub(crate) fn integer_to_float(from: IntegerType, to: ValueType) -> N {
     match (from, to == ValueType::F32) {
         (IntegerType::U32, true) => N::F32ConvertI32U,
         (IntegerType::U32, false) => N::F64ConvertI32U,
