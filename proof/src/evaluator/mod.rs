@@ -1,13 +1,16 @@
 //! The third evaluator: bytecode as `docs/bytecode.md` tells it, one instruction at a time, every access checked.
 //!
-//! It shares no code with the engines: integers are computed in 128 bits, strings on copies, references carry their
-//! types. Its only aim is that a reader can hold it against the document. Where the verifier's promise is broken (a wrong type on the
+//! Integers are computed in 128 bits, strings on copies, texts and dates are counted out, references carry their types. With the engines it shares the verifier's facts,
+//! of `khz_machine` the layout of the image and the bytes of a scalar in it (`load_scalar`, `store_scalar`), and two libraries: `libm` for what is no
+//! basic arithmetic (`machine/tests/numeric.rs` holds it near the system's library), and Rust's own digits of floating-point numbers, for which nothing else
+//! speaks here. The layout's other oracle is the tree of generated Structured Text, which knows no addresses. Its only aim is that a reader can hold it against the document. Where the verifier's promise is broken (a wrong type on the
 //! stack, an access outside the image, a control variable that was proven to be kept and is not), it panics: that is a finding in the verifier, and the panic is its report.
 
 mod calendar;
 mod numeric;
 mod step;
 mod strings;
+mod texts;
 
 use std::ops::Range;
 use std::sync::Arc;
