@@ -186,7 +186,7 @@ fn a_configuration_with_everything() {
         (1, 1, 1, 1)
     );
     assert!(plant.access_vars[0].writable);
-    assert_eq!(plant.config_vars[0].path.len(), 3);
+    assert_eq!(plant.config_vars[0].path.span.end - plant.config_vars[0].path.span.start, 9);
     let cpu = &plant.resources[0];
     assert_eq!(cpu.tasks[0].attributes[0].value.as_deref(), Some("T#10ms"));
     let params: Vec<_> =

@@ -36,7 +36,6 @@ impl<'a> Analyzer<'a> {
         for declaration in ast.declarations() {
             let Declaration::Configuration(found) = declaration else { continue };
             any = true;
-            self.refuse_config_sections(found);
             let mut names: BTreeMap<Symbol, Span> = BTreeMap::new();
             for declared in &found.resources {
                 if let Some(name) = &declared.name
@@ -48,18 +47,15 @@ impl<'a> Analyzer<'a> {
                 planned.push(self.resource(found, declared, configuration, resource, startup));
                 resource += 1;
             }
+            let here = planned.len() - found.resources.len();
+            self.config_entries(found, &mut planned[here..]);
             configuration += 1;
         }
         if !any {
             planned.extend(self.default_resource(startup));
+            self.refuse_placeless(&planned, &[]);
         }
         planned
-    }
-
-    fn refuse_config_sections(&mut self, found: &Configuration) {
-        if let Some(entry) = found.config_vars.first() {
-            self.report(&rules::NOT_SUPPORTED, entry.span, "VAR_CONFIG is not of the language yet");
-        }
     }
 
     /// The function with `{attribute 'startup'}`.
@@ -107,6 +103,8 @@ impl<'a> Analyzer<'a> {
                 copy_in: Vec::new(),
                 inouts: Vec::new(),
                 copy_out: Vec::new(),
+                values: Vec::new(),
+                image_values: Vec::new(),
                 span: pou.name.span,
             });
         }
@@ -230,6 +228,8 @@ impl<'a> Analyzer<'a> {
             copy_in: Vec::new(),
             inouts: Vec::new(),
             copy_out: Vec::new(),
+            values: Vec::new(),
+            image_values: Vec::new(),
             span: program.name.span,
         };
         let mut connected: Vec<VarId> = Vec::new();

@@ -358,7 +358,14 @@ impl<'a> Analyzer<'a> {
                 // Its body runs only when EN is TRUE, and may take ENO back (6.6.1.7).
                 var.init = Value::Scalar(Const::Int(1));
             }
-            var.located = if at == 0 { self.located(decl, ty) } else { first.and_then(|first| first.located) };
+            var.area = self.incomplete_address(decl, pou.kind, class, ty);
+            var.located = if var.area.is_some() {
+                None
+            } else if at == 0 {
+                self.located(decl, ty)
+            } else {
+                first.and_then(|first| first.located)
+            };
             if var.located.is_some() && pou.kind == PouKind::Function {
                 self.report(&rules::BAD_ADDRESS, decl.span, "a FUNCTION has no variables at fixed addresses");
             }
@@ -396,13 +403,15 @@ impl<'a> Analyzer<'a> {
     fn located(&mut self, decl: &VarDecl, ty: Ty) -> Option<Located> {
         let address = decl.address.as_ref()?;
         if address.is_incomplete() {
-            self.report(
-                &rules::NOT_SUPPORTED,
-                address.span,
-                "addresses that VAR_CONFIG completes are not of the language yet",
-            );
+            let message = "only a VAR of a program or function block leaves its address to VAR_CONFIG";
+            self.report(&rules::BAD_ADDRESS, address.span, message);
             return None;
         }
+        self.located_at(address, ty)
+    }
+
+    /// The place of an address for a variable of a type.
+    pub(super) fn located_at(&mut self, address: &DirectAddress, ty: Ty) -> Option<Located> {
         let located = self.address(address)?;
         if ty == Ty::Error {
             return Some(located);
@@ -493,6 +502,7 @@ fn new_var(name: &Ident, spelling: &str, ty: Ty, class: VarClass, init: Value) -
         located: None,
         retain: false,
         field: None,
+        area: None,
         edge: None,
     }
 }

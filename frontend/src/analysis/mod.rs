@@ -15,6 +15,7 @@ mod union;
 mod bcd;
 mod call;
 mod config;
+mod configured;
 mod convert;
 mod declare;
 mod edges;

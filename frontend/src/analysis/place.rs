@@ -219,7 +219,15 @@ impl<'a> Checker<'_, 'a> {
         }
     }
 
-    fn note_image(&mut self, located: Located, bytes: u32) {
+    /// The area of a root that VAR_CONFIG places.
+    fn root_area(&self, root: Root) -> Option<BytePlace> {
+        match root {
+            Root::Var(VarId(var)) => self.info.as_ref()?.vars.get(var as usize)?.area,
+            _ => None,
+        }
+    }
+
+    pub(super) fn note_image(&mut self, located: Located, bytes: u32) {
         let at = match located.place {
             BytePlace::Input => 0,
             BytePlace::Output => 1,
@@ -383,7 +391,8 @@ impl<'a> Checker<'_, 'a> {
             Root::System(_) => Some(("the system variables are read-only".to_owned(), None)),
             _ => None,
         };
-        let input = self.root_location(place.root).is_some_and(|located| located.place == BytePlace::Input);
+        let input = self.root_location(place.root).is_some_and(|located| located.place == BytePlace::Input)
+            || (self.test.is_none() && self.root_area(place.root) == Some(BytePlace::Input));
         let refusal = refusal.or_else(|| input.then(|| ("%I is read-only for programs".to_owned(), None)));
         let refusal = refusal.or_else(|| {
             let refused = if self.test.is_none() { self.refuse_output(place) } else { None };

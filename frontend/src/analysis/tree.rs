@@ -104,6 +104,8 @@ pub struct VarInfo {
     pub init: Value,
     /// AT %….
     pub located: Option<Located>,
+    /// `AT %I*`: the area in which VAR_CONFIG gives each instance's its place.
+    pub area: Option<BytePlace>,
     /// RETAIN or PERSISTENT.
     pub retain: bool,
     /// Position among the fields of its function block.
@@ -268,6 +270,10 @@ pub struct InstancePlan {
     pub inouts: Vec<(VarId, Place)>,
     /// Statements after its body.
     pub copy_out: Vec<Stmt>,
+    /// Initial values that VAR_CONFIG gives to its variables in place of the declared ones.
+    pub values: Vec<(VarId, Value)>,
+    /// Initial values of places of the process image that VAR_CONFIG gives to its variables.
+    pub image_values: Vec<(Located, Ty, Value)>,
     /// Where it is declared.
     pub span: Span,
 }

@@ -206,6 +206,16 @@ rules! {
         wrong "PROGRAM p\nEND_PROGRAM\nCONFIGURATION c\n  RESOURCE r ON cpu\n    {attribute 'watchdgo' := 'T#5ms'}\n    TASK t(INTERVAL := T#1ms, PRIORITY := 0);\n    PROGRAM i WITH t : p;\n  END_RESOURCE\nEND_CONFIGURATION\n"
         right "PROGRAM p\nEND_PROGRAM\nCONFIGURATION c\n  RESOURCE r ON cpu\n    {attribute 'watchdog' := 'T#5ms'}\n    TASK t(INTERVAL := T#1ms, PRIORITY := 0);\n    PROGRAM i WITH t : p;\n  END_RESOURCE\nEND_CONFIGURATION\n"
     }
+    PLACELESS = "S0043" Error "a variable without its place" {
+        "`AT %I*`, `AT %Q*` and `AT %M*` leave the address to VAR_CONFIG, which must give one for every instance of the program or function block."
+        wrong "PROGRAM p\nVAR\n  a AT %I* : BOOL;\n  q : BOOL;\nEND_VAR\n  q := a;\nEND_PROGRAM\nCONFIGURATION c\n  RESOURCE r ON cpu\n    TASK t(INTERVAL := T#1ms, PRIORITY := 0);\n    PROGRAM i WITH t : p;\n  END_RESOURCE\nEND_CONFIGURATION\n"
+        right "PROGRAM p\nVAR\n  a AT %I* : BOOL;\n  q : BOOL;\nEND_VAR\n  q := a;\nEND_PROGRAM\nCONFIGURATION c\n  RESOURCE r ON cpu\n    TASK t(INTERVAL := T#1ms, PRIORITY := 0);\n    PROGRAM i WITH t : p;\n  END_RESOURCE\n  VAR_CONFIG\n    r.i.a AT %IX0.3 : BOOL;\n  END_VAR\nEND_CONFIGURATION\n"
+    }
+    CONFIG_VAR = "S0044" Error "a wrong entry of VAR_CONFIG" {
+        "An entry is `resource.program.variable`, through function block instances, structures and arrays where the variable lies deeper. It gives an address to what is declared `AT %I*`, `%Q*` or `%M*`, in that area, and an initial value to any stored variable."
+        wrong "PROGRAM p\nVAR\n  n : INT;\nEND_VAR\n  n := n + 1;\nEND_PROGRAM\nCONFIGURATION c\n  RESOURCE r ON cpu\n    TASK t(INTERVAL := T#1ms, PRIORITY := 0);\n    PROGRAM i WITH t : p;\n  END_RESOURCE\n  VAR_CONFIG\n    r.i.n AT %QW0 : INT;\n  END_VAR\nEND_CONFIGURATION\n"
+        right "PROGRAM p\nVAR\n  n : INT;\nEND_VAR\n  n := n + 1;\nEND_PROGRAM\nCONFIGURATION c\n  RESOURCE r ON cpu\n    TASK t(INTERVAL := T#1ms, PRIORITY := 0);\n    PROGRAM i WITH t : p;\n  END_RESOURCE\n  VAR_CONFIG\n    r.i.n : INT := 5;\n  END_VAR\nEND_CONFIGURATION\n"
+    }
     LIMIT = "S0050" Error "a limit of the container" {
         "The compiled form has room for 65535 of each kind of thing, and a memory image has a largest size. Split the project into resources."
         wrong ""

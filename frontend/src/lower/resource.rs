@@ -162,7 +162,10 @@ impl Builder<'_> {
         let mut values: Vec<(Home, Ty, Value)> = Vec::new();
         self.each_variable(bases, |instance, at, home| {
             let found = match instance {
-                Some((_, info, at)) => info.vars.get(at).map(|var| (var.ty, var.init.clone())),
+                Some((instance, info, at)) => info.vars.get(at).map(|var| {
+                    let own = instance.values.iter().find(|(id, _)| id.0 as usize == at);
+                    (var.ty, own.map_or_else(|| var.init.clone(), |(_, value)| value.clone()))
+                }),
                 None => project.globals.get(at).map(|global| (global.ty, global.init.clone())),
             };
             if let Some((ty, init)) = found {
@@ -170,6 +173,9 @@ impl Builder<'_> {
             }
         });
         self.located_block_values(&mut values);
+        for (located, ty, value) in self.plan.instances.iter().flat_map(|instance| &instance.image_values) {
+            values.push((super::memory::located_home(*located), *ty, value.clone()));
+        }
         let mut image: BTreeMap<(Region, u32), u8> = BTreeMap::new();
         for (home, ty, value) in values {
             match home {

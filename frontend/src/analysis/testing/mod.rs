@@ -91,6 +91,8 @@ impl<'a> Analyzer<'a> {
                 copy_in: Vec::new(),
                 inouts: Vec::new(),
                 copy_out: Vec::new(),
+                values: Vec::new(),
+                image_values: Vec::new(),
                 span: unit.span,
             };
             let plan = ResourcePlan {
@@ -262,6 +264,7 @@ impl<'a> Checker<'_, 'a> {
                 located: None,
                 retain: false,
                 edge: None,
+                area: None,
                 field: None,
             });
         }

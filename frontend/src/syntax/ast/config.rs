@@ -124,8 +124,8 @@ pub enum Connection {
 /// `resource.program.variable AT %… : type := value;` in VAR_CONFIG.
 #[derive(Debug)]
 pub struct ConfigVar {
-    /// The path's names.
-    pub path: Vec<Ident>,
+    /// The path: names, and indices in brackets.
+    pub path: Expr,
     /// `AT %…`.
     pub address: Option<DirectAddress>,
     /// The type.

@@ -278,14 +278,11 @@ impl Parser<'_> {
         None
     }
 
-    /// `config = 'VAR_CONFIG' { name { '.' name } [ 'AT' direct-address ] ':' type [ ':=' initial-value ] ';' } 'END_VAR'`.
+    /// `config = 'VAR_CONFIG' { variable [ 'AT' direct-address ] ':' type [ ':=' initial-value ] ';' } 'END_VAR'`.
     fn config_section(&mut self, into: &mut Vec<ConfigVar>) {
         self.section(|parser| {
             let start = parser.span();
-            let mut path = vec![parser.name("the path of a variable")];
-            while parser.eat(TokenKind::Dot).is_some() {
-                path.push(parser.name("the next name of the path"));
-            }
+            let path = parser.postfix();
             let address = parser.location();
             let ty = parser.declared_type("the path of the variable");
             let init = parser.optional_init();
