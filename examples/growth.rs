@@ -3,6 +3,7 @@
 //! `cargo run --release --example growth [-- SHAPE…]` prints a table for each shape; SHAPE is one of those in [`SHAPES`].
 
 use std::fmt::Write;
+use std::process::Command;
 use std::sync::Arc;
 
 use khz_bytecode::container;
@@ -27,6 +28,8 @@ const SHAPES: &[Shape] = &[
 
 /// Each figure is the least of so many runs.
 const RUNS: usize = 3;
+/// First argument of a process that measures one program.
+const ONE: &str = "--one";
 /// Runs whose scans are timed: at least so many instructions' worth of units.
 const UNITS_TIMED: usize = 2_000_000;
 
@@ -178,29 +181,49 @@ fn scan_ns(program: &Program, engine: &mut dyn Engine, units: usize) -> f64 {
     ms * 1e6 / scans as f64
 }
 
+/// Columns of a row, as the child process writes them and the parent reads them.
+impl Row {
+    fn figures(&self) -> [f64; 8] {
+        let [jit_ns, interp_ns] = self.scan_ns;
+        let code_bytes = self.code_bytes as f64;
+        [self.frontend_ms, self.load_ms, self.verify_ms, self.interp_ms, self.jit_ms, code_bytes, jit_ns, interp_ns]
+    }
+}
+
+/// Measures once, in a process of its own: memory that an earlier measurement left behind would make small programs look cheap, since they fit into
+/// it and need nothing new from the host.
+fn measured_apart(name: &str, count: usize) -> [f64; 8] {
+    let own = std::env::current_exe().expect("it has a path");
+    let child = Command::new(own).args([ONE, name, &count.to_string()]).output().expect("it starts");
+    assert!(child.status.success(), "{name} {count}: {}", String::from_utf8_lossy(&child.stderr));
+    let text = String::from_utf8_lossy(&child.stdout);
+    let figures: Vec<f64> = text.split_whitespace().map(|figure| figure.parse().expect("a figure")).collect();
+    figures.try_into().expect("a row")
+}
+
 #[expect(clippy::print_stdout, reason = "the tables are what this example is for")]
 fn main() {
     let asked: Vec<String> = std::env::args().skip(1).collect();
-    for (name, sizes, text) in SHAPES.iter().filter(|row| asked.is_empty() || asked.iter().any(|a| a == row.0)) {
+    if let [mark, name, count] = asked.as_slice()
+        && mark == ONE
+    {
+        let count: usize = count.parse().expect("a count");
+        let text = SHAPES.iter().find(|row| row.0 == name).expect("a shape").2;
+        println!("{}", measure(&text(count), count).figures().map(|figure| figure.to_string()).join(" "));
+        return;
+    }
+    for (name, sizes, _) in SHAPES.iter().filter(|row| asked.is_empty() || asked.iter().any(|a| a == row.0)) {
         println!(
             "| {name} | front end, ms | load, ms | verify, ms | interp, ms | jit, ms | code, bytes | jit, µs each | scan jit, ns | scan interp, ns |"
         );
         println!("|---|---|---|---|---|---|---|---|---|---|");
         for &count in *sizes {
-            let text = text(count);
-            let rows: Vec<Row> = (0..RUNS).map(|_| measure(&text, count)).collect();
-            let least = |of: fn(&Row) -> f64| rows.iter().map(of).fold(f64::INFINITY, f64::min);
-            let jit_ms = least(|row| row.jit_ms);
+            let rows: Vec<[f64; 8]> = (0..RUNS).map(|_| measured_apart(name, count)).collect();
+            let least = |of: usize| rows.iter().map(|row| row[of]).fold(f64::INFINITY, f64::min);
+            let [frontend, load, verify, interp, jit, code, scan_jit, scan_interp] = std::array::from_fn(least);
             println!(
-                "| {count} | {:.2} | {:.2} | {:.2} | {:.2} | {jit_ms:.2} | {} | {:.1} | {:.0} | {:.0} |",
-                least(|row| row.frontend_ms),
-                least(|row| row.load_ms),
-                least(|row| row.verify_ms),
-                least(|row| row.interp_ms),
-                rows[0].code_bytes,
-                jit_ms * 1e3 / count as f64,
-                least(|row| row.scan_ns[0]),
-                least(|row| row.scan_ns[1]),
+                "| {count} | {frontend:.2} | {load:.2} | {verify:.2} | {interp:.2} | {jit:.2} | {code} | {:.1} | {scan_jit:.0} | {scan_interp:.0} |",
+                jit * 1e3 / count as f64,
             );
         }
         println!();
