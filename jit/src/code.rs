@@ -3,6 +3,7 @@
 //! This file may use `unsafe`: it frees code when its last holder goes, and it calls code with the interface that the lowering gave it.
 
 use std::collections::BTreeMap;
+use std::mem::MaybeUninit;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -159,9 +160,9 @@ impl Handle {
             image: start,
             image_bytes: image.len() as u64,
             virtuals,
-            found_code: std::ptr::null(),
-            found_frame_bytes: 0,
-            chain: [0; MAX_TRAP_CHAIN + 1],
+            found_code: MaybeUninit::uninit(),
+            found_frame_bytes: MaybeUninit::uninit(),
+            chain: [MaybeUninit::uninit(); MAX_TRAP_CHAIN + 1],
         };
         // SAFETY: the image has the size of the layout that the code was compiled for and is lent to this call alone; the deadline cell and the
         // tables outlive it; entries have neither parameters nor results (the verifier's rule).
@@ -192,6 +193,15 @@ impl Handle {
                 function(image, context, frame, slots, block)
             }
         }
+    }
+}
+
+impl Context {
+    /// Places of the calls around a trap, innermost first.
+    pub fn calls(&self) -> impl Iterator<Item = u32> {
+        let recorded = (self.chain_len as usize).min(MAX_TRAP_CHAIN);
+        // SAFETY: native code counts a call in `chain_len` only together with writing its entry, and entries that have no room lie behind these.
+        self.chain.iter().take(recorded).map(|place| unsafe { place.assume_init() })
     }
 }
 

@@ -1,6 +1,6 @@
 //! What native code sees of the host: one structure, declared once; the lowering takes every offset from it.
 
-use std::mem::offset_of;
+use std::mem::{MaybeUninit, offset_of};
 use std::sync::atomic::AtomicU32;
 
 use khz_bytecode::limits::MAX_TRAP_CHAIN;
@@ -8,6 +8,8 @@ use khz_bytecode::limits::MAX_TRAP_CHAIN;
 use crate::runtime::Virtuals;
 
 /// Limits, trap record and host addresses of one run. Native code gets its address as second parameter.
+///
+/// What is only read after it was written starts without a value: a run of a short program is little more than the making of this.
 #[derive(Debug)]
 #[repr(C)]
 pub struct Context {
@@ -33,12 +35,12 @@ pub struct Context {
     pub image_bytes: u64,
     /// Where virtual calls go.
     pub virtuals: *const Virtuals,
-    /// Code that the last look-up of a virtual call found.
-    pub found_code: *const u8,
-    /// Frame bytes of that code's function.
-    pub found_frame_bytes: u64,
-    /// Places of the calls around the trap, innermost first. The last entry takes all that have no room.
-    pub chain: [u32; MAX_TRAP_CHAIN + 1],
+    /// Code that the last look-up of a virtual call found; nothing before the first.
+    pub found_code: MaybeUninit<*const u8>,
+    /// Frame bytes of that code's function; nothing before the first look-up.
+    pub found_frame_bytes: MaybeUninit<u64>,
+    /// Places of the calls around the trap, innermost first: as many as `chain_len` says, of those that have room. The last entry takes all that have none.
+    pub chain: [MaybeUninit<u32>; MAX_TRAP_CHAIN + 1],
 }
 
 /// Trap code of a charge larger than what is left; the host makes it *watchdog* and leaves no fuel.

@@ -235,8 +235,7 @@ impl Jit {
         let code = u8::try_from(code).ok().and_then(TrapCode::from_code).unwrap_or(TrapCode::Stopped);
         let (place, mut caller) = self.place(context.trap_place);
         let mut trap = Trap::new(code, place, context.trap_values);
-        let recorded = (context.chain_len as usize).min(context.chain.len() - 1);
-        let mut calls = context.chain[..recorded].iter();
+        let mut calls = context.calls();
         loop {
             // Inlined calls lie between a place and the call that is recorded next.
             while let Some(inlined) = caller {
@@ -245,7 +244,7 @@ impl Jit {
                 caller = outer;
             }
             let Some(call) = calls.next() else { return trap };
-            let (place, outer) = self.place(*call);
+            let (place, outer) = self.place(call);
             trap.push_caller(place);
             caller = outer;
         }

@@ -74,8 +74,8 @@ unsafe extern "C" fn find_method(context: *mut Context, address: i64, method: u3
     let entry = found.and_then(|function| virtuals.entries.get(function.index()));
     match entry.filter(|entry| !entry.code.is_null()) {
         Some(entry) => {
-            context.found_code = entry.code;
-            context.found_frame_bytes = u64::from(entry.frame_bytes);
+            context.found_code.write(entry.code);
+            context.found_frame_bytes.write(u64::from(entry.frame_bytes));
             1
         }
         None => 0,

@@ -189,6 +189,37 @@ fn an_index_is_checked_once_on_a_way() {
 }
 
 #[test]
+fn a_load_shortly_behind_a_store_takes_its_value() {
+    let text = |between: &str| {
+        format!(
+            "global a i32\nglobal b i16\nglobal c i32\ntype n scalar i32\narray v n 0..9\ndata d v\nfunction main\nlocal r ref:n\n\
+             address d d v\nconst.i32 3\nref.index v\nslot.store l r\nslot.load g c\nslot.store g a\nslot.load g c\nslot.store g b\n\
+             slot.load g c\nstore d i32 d+4\n{between}slot.load g a\nslot.load g b\ni32.add\nload d i32 d+4\ni32.add\nslot.store g c\nreturn\nend\n\
+             function f\nreturn\nend\n"
+        )
+    };
+    // Loads of a, b (made narrow), d+4, and c besides its first one.
+    let loads = |between: &str| {
+        let form = form(&text(between), only(&["forward"]));
+        assert_eq!(count(&form, "slot.store"), 3 + count(between, "slot.store g"), "{form}");
+        let of = |what| count(&form, what);
+        (of("slot.load g0"), of("slot.load g1"), of("slot.load g2"), of("= load"), of("extend16_s"))
+    };
+    assert_eq!(loads(""), (0, 0, 1, 0, 1));
+    assert_eq!(loads("const.i32 1\nslot.store g a\n"), (0, 0, 1, 0, 1), "the newest value");
+    assert_eq!(loads("const.i32 1\nstore d i32 d+8\n"), (0, 0, 1, 0, 1), "beside it");
+    assert_eq!(loads("slot.load l r\nconst.i32 1\nref.store i32\n"), (0, 0, 1, 1, 1), "it may point there");
+    assert_eq!(loads("call f\n"), (1, 1, 1, 1, 0));
+    assert_eq!(
+        loads("top:\nslot.load g a\njump.if top\n"),
+        (1, 1, 1, 1, 0),
+        "a loop's header is reached on two ways; what it loads serves behind it"
+    );
+    assert_eq!(loads("slot.load g a\njump.if next\nnop\nnext:\n"), (1, 1, 1, 1, 0), "ways join");
+    assert_eq!(loads(&"nop\nconst.i32 1\ndrop\n".repeat(60)), (1, 1, 1, 1, 0), "too far");
+}
+
+#[test]
 fn loops_over_independent_floats_run_in_vectors() {
     let text = |store: &str, last: u32| {
         format!(
@@ -216,7 +247,7 @@ fn it_is_noted_which_passes_changed_something() {
         let fired = load_with(text, options).engine.passes_fired().unwrap();
         fired.rows().filter(|row| row.1).map(|row| row.0).collect::<Vec<_>>()
     };
-    assert_eq!(fired(SUM, Passes::ALL), ["promote", "fold", "for_loops", "checks", "deadlines"]);
+    assert_eq!(fired(SUM, Passes::ALL), ["promote", "fold", "for_loops", "checks", "deadlines", "forward"]);
     assert_eq!(fired(SUM, only(&["promote", "bools"])), ["promote"]);
     assert_eq!(fired("function main\nreturn\nend\n", Passes::ALL), Vec::<&str>::new());
     assert_eq!(load_with(SUM, JitOptions::default()).engine.passes_fired(), None);

@@ -166,12 +166,14 @@ impl Image {
 
     /// All its bytes.
     #[must_use]
+    #[inline]
     pub fn bytes(&self) -> &[u8] {
         &self.storage[self.start..self.start + self.layout.total_bytes() as usize]
     }
 
     /// All its bytes.
     #[must_use]
+    #[inline]
     pub fn bytes_mut(&mut self) -> &mut [u8] {
         let range = self.start..self.start + self.layout.total_bytes() as usize;
         &mut self.storage[range]

@@ -2,21 +2,17 @@
 
 use std::collections::BTreeMap;
 
-use khz_bytecode::container::{ControlPlace, ElementaryType as E, Field, ForLoop, Function, Owner};
+use khz_bytecode::container::{ControlPlace, Field, ForLoop, Function, Owner};
 use khz_bytecode::ids::{ForId, Label, SlotIndex};
-use khz_bytecode::instruction::{Instruction as I, NumericOp as N};
+use khz_bytecode::instruction::Instruction as I;
 use khz_bytecode::value::{BytePlace, LocalType, SlotPlace, Storage, ValueType};
 
 use super::Builder;
 use super::emit::Emitter;
 use super::place::{Address, Home};
-use crate::analysis::ops;
-use crate::analysis::tree::{BinOp, CaseArm, Expr, ExprKind, ForStmt, Place, PouId, Stmt, StmtKind, VarId};
+use crate::analysis::tree::{Expr, ExprKind, ForStmt, Place, PouId, Stmt, StmtKind, VarId};
 use crate::analysis::types::{Const, Ty, TyKind, integer_type};
 use crate::source::Span;
-
-/// Largest span of values that a CASE turns into one `switch`.
-const MAX_SWITCH_SPAN: i128 = 1024;
 
 /// A call whose arguments and outputs are being handled.
 #[derive(Debug)]
@@ -357,77 +353,4 @@ impl<'b, 'p> FunctionBuilder<'b, 'p> {
             _ => None,
         }
     }
-
-    fn case(&mut self, selector: &Expr, arms: &[CaseArm], otherwise: &[Stmt]) {
-        let elementary = self.elementary(selector.ty);
-        let labels: Vec<Label> = arms.iter().map(|_| self.e.label()).collect();
-        let default = self.e.label();
-        let end = self.e.label();
-        self.value(selector);
-        if let Some((low, targets)) = switch_targets(arms, &labels, default, elementary) {
-            self.i32_const(low);
-            self.numeric(N::I32Sub);
-            self.e.push(I::Switch { targets }, 1, 0);
-        } else {
-            let slot = self.scratch(elementary.storage());
-            self.e.push(I::SlotStore { place: SlotPlace::Local, index: slot }, 1, 0);
-            for (arm, label) in arms.iter().zip(&labels) {
-                for range in &arm.ranges {
-                    self.case_range(slot, elementary, *range, *label);
-                }
-            }
-            self.e.push(I::Jump { target: default }, 0, 0);
-            self.release(slot);
-        }
-        for (arm, label) in arms.iter().zip(&labels) {
-            self.e.bind(*label);
-            self.statements(&arm.body);
-            self.e.push(I::Jump { target: end }, 0, 0);
-        }
-        self.e.bind(default);
-        self.statements(otherwise);
-        self.e.bind(end);
-    }
-
-    fn case_range(&mut self, slot: SlotIndex, ty: E, (low, high): (i128, i128), label: Label) {
-        let compare = |this: &mut Self, op: BinOp, value: i128| {
-            this.e.push(I::SlotLoad { place: SlotPlace::Local, index: slot }, 0, 1);
-            this.constant(&Const::Int(crate::analysis::types::wrap(ty, value)), ty);
-            if let Some(op) = ops::binary(op, ty) {
-                this.numeric(op);
-            }
-        };
-        if low == high {
-            compare(self, BinOp::Eq, low);
-        } else {
-            compare(self, BinOp::Ge, low);
-            compare(self, BinOp::Le, high);
-            self.numeric(N::I32And);
-        }
-        self.e.push(I::JumpIf { target: label }, 1, 0);
-    }
-}
-
-/// Targets of a `switch` for a CASE whose values stand close together: lowest value and one label for each.
-fn switch_targets(arms: &[CaseArm], labels: &[Label], default: Label, ty: E) -> Option<(i32, Vec<Label>)> {
-    if ty.storage().value_type() != ValueType::I32 {
-        return None;
-    }
-    let ranges =
-        || arms.iter().zip(labels).flat_map(|(arm, label)| arm.ranges.iter().map(move |range| (*range, *label)));
-    let low = ranges().map(|((low, _), _)| low).min()?;
-    let high = ranges().map(|((_, high), _)| high).max()?;
-    let values: i128 = ranges().map(|((low, high), _)| high - low + 1).sum();
-    let span = high - low + 1;
-    if ranges().count() < 4 || span > MAX_SWITCH_SPAN || values * 4 < span {
-        return None;
-    }
-    let mut targets = vec![default; usize::try_from(span).ok()? + 1];
-    for ((from, to), label) in ranges() {
-        let (from, to) = (usize::try_from(from - low).ok()?, usize::try_from(to - low).ok()?);
-        targets.get_mut(from..=to)?.fill(label);
-    }
-    #[expect(clippy::cast_possible_truncation, reason = "a value of 32 bits; UDINT wraps as the subtraction does")]
-    let low = low as i64 as i32;
-    Some((low, targets))
 }

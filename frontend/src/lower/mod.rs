@@ -9,6 +9,7 @@
 
 mod body;
 mod call;
+mod case;
 mod codes;
 mod emit;
 mod expr;

@@ -176,8 +176,8 @@ impl FunctionBuilder<'_, '_> {
     pub(super) fn assign_text(&mut self, target: &Place, value: &Expr) {
         self.reference(target);
         match &value.kind {
-            // Straight into the target where no operand can be the target.
-            ExprKind::Text(op, parts) if parts.iter().all(is_apart) => {
+            // Straight into the target where that cuts no sooner than the operation itself: it reads all operands before it writes.
+            ExprKind::Text(op, parts) if capacity(value.ty) >= capacity(target.ty) || parts.iter().all(is_apart) => {
                 self.text_operation(*op, parts, target.ty);
             }
             _ => self.assign_text_from(value, target.ty),

@@ -8,6 +8,7 @@ pub mod checks;
 pub mod deadlines;
 pub mod fold;
 pub mod for_loops;
+pub mod forward;
 pub mod if_convert;
 pub mod inline;
 pub mod promote;
@@ -67,6 +68,8 @@ passes! {
     deadlines;
     /// [`vectorise`]: loops over independent elements in vectors. Not in code that charges fuel.
     vectorise;
+    /// [`forward`]: a load shortly behind a store takes the value from there.
+    forward;
     /// [`if_convert`]: short integer IFs as selects.
     if_convert;
     /// [`threads`]: no question where the answer was just set.
@@ -147,6 +150,7 @@ impl<'a> Improver<'a> {
             deadlines => deadlines::run;
             vectorise if !fuel => vectorise::run;
             for_loops => for_loops::run;
+            forward => forward::run;
             fold => fold::run;
             if_convert => if_convert::run;
             threads => threads::run;

@@ -226,7 +226,7 @@ fn choose(function: &Function, blocks: &[usize], effects: CallEffects<'_>) -> BT
 }
 
 /// The operation that gives what a load gives after a store.
-fn wrap(storage: Storage) -> Option<NumericOp> {
+pub(super) fn wrap(storage: Storage) -> Option<NumericOp> {
     match storage {
         Storage::Bool => Some(NumericOp::I32Nez),
         Storage::I8 => Some(NumericOp::I32Extend8S),

@@ -83,7 +83,7 @@ fn keep(op: &Op, results: &Results, known: &mut Known, same: &mut [Value]) -> bo
 }
 
 /// Blocks that exactly one way leads into.
-fn single_ways(function: &Function) -> Vec<bool> {
+pub(super) fn single_ways(function: &Function) -> Vec<bool> {
     let mut ways = vec![0usize; function.blocks.len()];
     for block in &function.blocks {
         for target in block.terminator.targets() {

@@ -249,7 +249,19 @@ pub fn string_find(memory: &[u8], a: StringPlace, b: StringPlace) -> i32 {
     if wanted.is_empty() {
         return 0;
     }
-    memchr::memmem::find(text, wanted).map_or(0, |at| at as i32 + 1)
+    let found = if text.len() <= SHORT_BYTES { find_short(text, wanted) } else { memchr::memmem::find(text, wanted) };
+    found.map_or(0, |at| at as i32 + 1)
+}
+
+/// Longest text that is searched place by place: what makes long searches fast takes longer to set up than this.
+const SHORT_BYTES: usize = 128;
+
+#[inline]
+fn find_short(text: &[u8], wanted: &[u8]) -> Option<usize> {
+    let (first, rest) = wanted.split_first()?;
+    let places = text.len().checked_sub(rest.len())?;
+    let starts = text.iter().take(places).enumerate().filter(|(_, byte)| *byte == first);
+    starts.map(|(at, _)| at).find(|at| text.get(at + 1..).is_some_and(|behind| behind.starts_with(rest)))
 }
 
 /// The row `string_compare`.
