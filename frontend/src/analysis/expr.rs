@@ -9,10 +9,10 @@ use super::fold::{self, Unfolded};
 use super::testing::TestBody;
 use super::tree::{BinOp, Expr, ExprKind, GlobalId, PouId, PouInfo, Root, UnOp, Usage};
 use super::types::{BOOL, Const, Ty, TyKind, Value, is_bits, is_duration, is_integer, is_real, is_signed, is_unsigned};
-use super::{Analyzer, ConstKey};
+use super::{Analyzer, ConstKey, TypeSource};
 use crate::diagnostics::{semantic as names, types as rules};
 use crate::source::Span;
-use crate::syntax::ast::{self, Ident, LiteralValue};
+use crate::syntax::ast::{self, Ident, LiteralValue, TypeSpecKind};
 use crate::syntax::symbol::Symbol;
 
 /// Globals that a body sees, by name.
@@ -119,6 +119,9 @@ impl<'c, 'a> Checker<'c, 'a> {
             ast::ExprKind::Member { base, member } if self.list_of(base).is_some() => {
                 self.listed_value(expr, base, member)
             }
+            ast::ExprKind::Member { base, member } if self.names_enumeration(base).is_some() => {
+                self.names_enumeration(base).map_or_else(|| broken(span), |ty| self.enum_value(ty, member, span))
+            }
             ast::ExprKind::Direct(_)
             | ast::ExprKind::Member { .. }
             | ast::ExprKind::Index { .. }
@@ -170,6 +173,24 @@ impl<'c, 'a> Checker<'c, 'a> {
             _ if found.ty == to => found,
             _ => self.coerce(found, to),
         }
+    }
+
+    /// The enumeration that `Colour` in `Colour.red` names, where no variable has that name.
+    fn names_enumeration<'e>(&mut self, base: &'e ast::Expr) -> Option<&'e Ident> {
+        let ast::ExprKind::Name(name) = &base.kind else { return None };
+        let is_enumeration = match self.an.type_names.get(&name.symbol)?.source {
+            TypeSource::Declared(decl) => match &decl.spec.kind {
+                TypeSpecKind::Enum { .. } => true,
+                // Another name for one.
+                TypeSpecKind::Named(_) => {
+                    let ty = self.an.named_type(name.symbol, name.span).0;
+                    self.is_enum(ty)
+                }
+                _ => false,
+            },
+            TypeSource::Block(_) => false,
+        };
+        (is_enumeration && self.find_variable(name.symbol).is_none()).then_some(name)
     }
 
     fn enum_value(&mut self, ty: &Ident, value: &Ident, span: Span) -> Expr {

@@ -241,6 +241,9 @@ impl<'a> Checker<'_, 'a> {
         if member.is_missing() {
             return None;
         }
+        if let Some(bit) = self.constant_bit(&base, member) {
+            return self.part(base, AccessSize::Bit, bit, member.span, span);
+        }
         let (Ty::User(owner), Some(fields)) = (base.ty, self.an.types.fields(base.ty).cloned()) else {
             let message = format!("{} has no fields", self.an.types.name(base.ty));
             self.an.report(&names::UNKNOWN_MEMBER, member.span, message);
@@ -343,6 +346,21 @@ impl<'a> Checker<'_, 'a> {
                 self.an.report(&rules::INDEX, index.span, message);
                 None
             }
+        }
+    }
+
+    /// `w.READY`: the number of a bit by a CONSTANT.
+    fn constant_bit(&mut self, base: &Place, member: &Ident) -> Option<u32> {
+        let has_bits = self.an.types.elementary(base.ty).is_some_and(|ty| is_bits(ty) || is_integer(ty));
+        let root = self.find_variable(member.symbol).filter(|_| has_bits)?;
+        let (ty, value) = self.constant_value(root)?;
+        match (value, self.an.types.elementary(ty)) {
+            (Const::Int(value), Some(elementary)) if is_integer(elementary) => {
+                self.note_use(root, member.span);
+                // No bit has a negative number: what is no number of a bit is reported with the others.
+                Some(u32::try_from(value).unwrap_or(u32::MAX))
+            }
+            _ => None,
         }
     }
 
