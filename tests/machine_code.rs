@@ -2,6 +2,8 @@
 
 mod common;
 
+use std::collections::BTreeMap;
+
 use common::{Scratch, khz, root, stderr, stdout};
 use khz_bytecode::limits::MAX_IMAGE_BYTES;
 use khz_frontend::{CompileOptions, SourceInput};
@@ -76,9 +78,13 @@ fn what_is_listed_is_what_runs() {
             symbols.iter().map(|symbol| symbol.code.len()).sum::<usize>(),
             khz_machine::engine::Engine::code_bytes(&engine)
         );
+        // A function that exists once for each combination of its open arrays has one name; both lists have them in the same order.
+        let mut seen: BTreeMap<&str, usize> = BTreeMap::new();
         for symbol in &symbols {
             let name = file.display().to_string();
-            let unit = units.iter().find(|unit| unit.name == symbol.name);
+            let same_name = seen.entry(&symbol.name).or_default();
+            let unit = units.iter().filter(|unit| unit.name == symbol.name).nth(*same_name);
+            *same_name += 1;
             same_code(&name, unit.unwrap_or_else(|| panic!("{name}: no listing of {}", symbol.name)), symbol);
             compared += 1;
         }
