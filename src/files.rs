@@ -12,6 +12,8 @@ use crate::project::{self, Settings};
 
 /// Largest source or container file that is read, in bytes.
 pub const MAX_FILE_BYTES: u64 = 1 << 30;
+/// Files and folders below one folder that are looked at for sources: a whole disk, named by mistake, is refused soon.
+pub const MAX_ENTRIES: usize = 200_000;
 /// Endings of plain source files that are picked up from a folder; TwinCAT's are known to the front end.
 const SOURCE_ENDINGS: [&str; 2] = ["st", "iecst"];
 /// First bytes of every container.
@@ -60,6 +62,9 @@ pub enum FileError {
     /// A folder without sources.
     #[error("{0}: no Structured Text file (.st) in this folder")]
     NoSources(PathBuf),
+    /// A folder with too much in it.
+    #[error("{0}: there are more than {MAX_ENTRIES} files and folders below this one; name one closer to the sources")]
+    TooMany(PathBuf),
     /// A project file, or what it leads to, is wrong.
     #[error("the project file has errors")]
     Project {
@@ -165,37 +170,68 @@ pub fn read_limited(path: &Path, limit: u64) -> Result<Vec<u8>, FileError> {
 }
 
 /// Whether a file's ending says that it is a project file.
-pub(crate) fn is_project(path: &Path) -> bool {
+#[must_use]
+pub fn is_project(path: &Path) -> bool {
     path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml"))
 }
 
 /// Whether a file's ending says that it is a source.
-pub(crate) fn is_source(path: &Path) -> bool {
+#[must_use]
+pub fn is_source(path: &Path) -> bool {
     let ending = path.extension().and_then(|ending| ending.to_str());
     let mut known = SOURCE_ENDINGS.iter().chain(&twincat::ENDINGS);
     ending.is_some_and(|ending| known.any(|known| ending.eq_ignore_ascii_case(known)))
 }
 
 /// Adds all sources below a folder, by path.
+///
+/// # Errors
+/// A folder that can not be listed; more than [`MAX_ENTRIES`] files and folders.
 pub(crate) fn collect_folder(folder: &Path, files: &mut Vec<PathBuf>) -> Result<(), FileError> {
-    // A work list instead of recursion: folders may be nested deeply. Links are not followed, so it ends.
-    let mut folders = vec![folder.to_path_buf()];
     let mut found = Vec::new();
-    while let Some(folder) = folders.pop() {
-        let refused = |reason| FileError::Refused { path: folder.clone(), reason };
-        for entry in fs::read_dir(&folder).map_err(refused)? {
+    walk(folder, usize::MAX, MAX_ENTRIES, |path, is_folder| {
+        if !is_folder && is_source(path) {
+            found.push(path.to_path_buf());
+        }
+    })?;
+    found.sort();
+    files.append(&mut found);
+    Ok(())
+}
+
+/// Shows everything below a folder, so many levels deep, in no order: each path and whether it is a folder. Hidden folders are passed over,
+/// and links are not followed.
+///
+/// # Errors
+/// A folder that can not be listed; more than `most` files and folders.
+pub(crate) fn walk(
+    folder: &Path,
+    levels: usize,
+    most: usize,
+    mut show: impl FnMut(&Path, bool),
+) -> Result<(), FileError> {
+    // A work list instead of recursion: folders may be nested deeply. Links are not followed, so it ends.
+    let mut folders = vec![(folder.to_path_buf(), 1)];
+    let mut seen = 0;
+    while let Some((inner, level)) = folders.pop() {
+        let refused = |reason| FileError::Refused { path: inner.clone(), reason };
+        for entry in fs::read_dir(&inner).map_err(refused)? {
             let entry = entry.map_err(refused)?;
-            let kind = entry.file_type().map_err(refused)?;
+            seen += 1;
+            if seen > most {
+                return Err(FileError::TooMany(folder.to_path_buf()));
+            }
+            let is_folder = entry.file_type().map_err(refused)?.is_dir();
+            if is_folder && entry.file_name().to_string_lossy().starts_with('.') {
+                continue;
+            }
             let path = entry.path();
-            if kind.is_dir() && !entry.file_name().to_string_lossy().starts_with('.') {
-                folders.push(path);
-            } else if is_source(&path) {
-                found.push(path);
+            show(&path, is_folder);
+            if is_folder && level < levels {
+                folders.push((path, level + 1));
             }
         }
     }
-    found.sort();
-    files.append(&mut found);
     Ok(())
 }
 
@@ -207,6 +243,23 @@ mod tests {
     fn a_missing_file_is_named() {
         let error = read(&[PathBuf::from("/nowhere/plant.st")]).unwrap_err();
         assert!(error.to_string().starts_with("/nowhere/plant.st: "), "{error}");
+    }
+
+    #[test]
+    fn a_walk_ends_at_its_limit_and_depth() {
+        let folder = std::env::temp_dir().join(format!("khz-walk-{}", std::process::id()));
+        for name in ["a/b/c", "a/d", ".hidden/e"] {
+            fs::create_dir_all(folder.join(name)).unwrap();
+        }
+        let count = |levels, most| {
+            let mut seen = 0;
+            walk(&folder, levels, most, |_, _| seen += 1).map(|()| seen)
+        };
+        // The hidden folder is looked at, but not shown.
+        assert_eq!((count(9, 5).unwrap(), count(1, 5).unwrap(), count(2, 5).unwrap()), (4, 1, 3));
+        let refused = count(9, 4).unwrap_err();
+        assert!(matches!(refused, FileError::TooMany(_)) && refused.to_string().contains("khz-walk"), "{refused}");
+        fs::remove_dir_all(&folder).unwrap();
     }
 
     #[test]

@@ -17,6 +17,8 @@ use crate::files::{self, FileError};
 
 /// How many project files may lead to one another.
 const MAX_PROJECTS: usize = 256;
+/// What makes a path a pattern.
+const WILD: [char; 3] = ['*', '?', '['];
 
 /// How a project wants to be compiled.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -130,9 +132,19 @@ impl Reader {
         self.diagnostics.push(Diagnostic::new(&rules::NO_SUCH_FILE, span, message));
     }
 
-    /// Takes what one entry means.
+    /// Takes what one entry means; one that means too much is told where it stands.
     fn entry(&mut self, folder: &Path, entry: &ProjectPath, is_library: bool) -> Result<(), FileError> {
-        if entry.text.contains(['*', '?', '[']) {
+        match self.meaning(folder, entry, is_library) {
+            Err(too_many @ FileError::TooMany(_)) => {
+                self.report(entry.span, too_many.to_string());
+                Ok(())
+            }
+            other => other,
+        }
+    }
+
+    fn meaning(&mut self, folder: &Path, entry: &ProjectPath, is_library: bool) -> Result<(), FileError> {
+        if entry.text.contains(WILD) {
             return self.pattern(folder, entry);
         }
         let path = folder.join(&entry.text);
@@ -154,23 +166,45 @@ impl Reader {
         Ok(())
     }
 
+    /// Takes what a pattern matches. It is looked for below the folder that its first parts name, and no deeper than it reaches.
     fn pattern(&mut self, folder: &Path, entry: &ProjectPath) -> Result<(), FileError> {
-        let whole = glob::Pattern::escape(&folder.to_string_lossy());
-        let options = glob::MatchOptions { require_literal_leading_dot: true, ..glob::MatchOptions::new() };
-        let found = match glob::glob_with(&format!("{whole}/{}", entry.text), options) {
-            Ok(found) => found,
+        let parts: Vec<&str> = entry.text.split('/').collect();
+        let plain = parts.iter().take_while(|part| !part.contains(WILD)).count();
+        let below = match &parts[..plain] {
+            [] => folder.to_path_buf(),
+            [""] => PathBuf::from("/"),
+            plain => folder.join(plain.join("/")),
+        };
+        let pattern = match glob::Pattern::new(&parts[plain..].join("/")) {
+            Ok(pattern) => pattern,
             Err(error) => {
                 self.report(entry.span, format!("this pattern can not be read: {}", error.msg));
                 return Ok(());
             }
         };
+        let options = glob::MatchOptions {
+            require_literal_separator: true,
+            require_literal_leading_dot: true,
+            ..glob::MatchOptions::new()
+        };
+        let levels = if parts.contains(&"**") { usize::MAX } else { parts.len() - plain };
+        let mut found = Vec::new();
+        // What is not there matches nothing, as is said below.
+        if below.is_dir() {
+            files::walk(&below, levels, files::MAX_ENTRIES, |path, is_folder| {
+                let rest = path.strip_prefix(&below).unwrap_or(path);
+                if pattern.matches_path_with(rest, options) && (is_folder || files::is_source(path)) {
+                    found.push((path.to_path_buf(), is_folder));
+                }
+            })?;
+        }
+        found.sort();
         let mut any = false;
-        // What can not be listed has no sources that could be read.
-        for path in found.flatten() {
-            if path.is_file() && files::is_source(&path) {
+        for (path, is_folder) in found {
+            if !is_folder {
                 any = true;
                 self.take(path)?;
-            } else if path.is_dir() && self.folder(&path)? > 0 {
+            } else if self.folder(&path)? > 0 {
                 any = true;
             }
         }

@@ -211,6 +211,13 @@ fn located_inputs_come_before_those_of_programs() {
         assert_eq!(first.first_difference(&second), None);
     }
     assert!(changes > 15, "{changes}");
+    // Kept ones are not changed by way of their bytes.
+    let kept = ["MAIN.bit", "main.word"].map(str::to_string);
+    let mut none = RandomInputs::new(&program, &layout, 1, &kept);
+    assert!(none.is_empty() && !none.is_nameless());
+    let before = first.clone();
+    (0..50).for_each(|_| none.apply(&mut first));
+    assert_eq!(before.first_difference(&first), None);
 }
 
 #[test]

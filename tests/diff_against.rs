@@ -462,13 +462,17 @@ fn what_is_no_trace_is_refused_by_line_and_column() {
         assert!(matches!(output.status.code(), Some(1 | 2)), "{wanted}: {}", stderr(&output));
         assert!(stderr(&output).contains(wanted), "wanted {wanted}, got {}", stderr(&output));
     }
-    let maps: [(&str, &str); 6] = [
+    let maps: [(&str, &str); 10] = [
         ("main.level,main.level\nmain.alram,main.alarm\n", "map.csv:2, column 1: the trace has no column `main.alram`"),
         ("A\n", ":1, column 2: the variable of `A` is missing"),
         (",main.level\n", ":1, column 1: the name of a column is missing"),
         ("A,main.level,much\n", ":1, column 3: `much` is not a number"),
         ("A,main.level\na,main.alarm\n", ":2, column 1: `a` stands here twice"),
         ("A,main.level,1,2,3\n", ":1, column 5: COLUMN,VARIABLE,FACTOR,OFFSET"),
+        ("A,main.level,0\n", ":1, column 3: a factor of 0"),
+        ("main.alarm,main.alarm,2\n", ":1, column 3: `main.alarm` is no number"),
+        ("main.level,main.field[2]\n", "`main.field[2]` is `main.field[2]`, as column `main.level` is already"),
+        ("column,main.level\n", ":1, column 1: the trace has no column `column`"),
     ];
     for (text, wanted) in maps {
         let map = tank.scratch.write("map.csv", text);
@@ -476,23 +480,36 @@ fn what_is_no_trace_is_refused_by_line_and_column() {
         assert_eq!(output.status.code(), Some(1));
         assert!(stderr(&output).contains(wanted), "wanted {wanted}, got {}", stderr(&output));
     }
+    // What is compared is not written over.
+    let before = std::fs::read(&tank.trace).unwrap();
+    for report in [&tank.trace, &tank.source] {
+        let output = against(&tank.source, &tank.trace, &["--report", report.to_str().unwrap()]);
+        assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
+    }
+    assert!(std::fs::read(&tank.trace).unwrap() == before);
     let output = against(&tank.source, &tank.scratch.path("nowhere.csv"), &[]);
     assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
 }
 
 /// The tank, for reading traces without a process.
 fn tank() -> pipeline::Program {
-    let source = SourceInput { name: "tank.st".into(), bytes: TANK.into() };
+    program(TANK)
+}
+
+fn program(text: &str) -> pipeline::Program {
+    let source = SourceInput { name: "tank.st".into(), bytes: text.into() };
     pipeline::compile(&[source], &CompileOptions::default()).unwrap().programs.remove(0)
 }
 
 #[test]
 fn a_trace_holds_no_more_than_its_limit() {
-    let program = tank();
+    let width = 4000;
+    let text = format!("PROGRAM main VAR a : ARRAY[1..{width}] OF BOOL; END_VAR END_PROGRAM");
+    let program = program(&text);
     let (names, image) =
         (khz_machine::variables::VariableTable::of(program.container()), program.image(1 << 20).unwrap());
-    let width = 4000;
-    let mut text = format!("time_us{}\n", ",main.level".repeat(width));
+    let columns: String = (1..=width).map(|index| format!(",main.a[{index}]")).collect();
+    let mut text = format!("time_us{columns}\n");
     let row = ",".repeat(width);
     for time in 0..kilohertz::traces::MAX_CELLS / width + 2 {
         text += &format!("{time}{row}\n");
@@ -538,7 +555,14 @@ fn damaged_traces_and_mappings_are_read_or_refused() {
             0 => (good.as_bytes().to_vec(), damage(&mut random, map)),
             _ => (damage(&mut random, good), map.as_bytes().to_vec()),
         };
-        let mapping = Mapping::read("map.csv", &map).unwrap_or_default();
+        let mapping = match Mapping::read("map.csv", &map) {
+            Ok(mapping) => mapping,
+            Err(error) => {
+                assert!(error.to_string().starts_with("map.csv:"), "{error}");
+                refused += 1;
+                continue;
+            }
+        };
         let choice = Choice { mapping, drive: None };
         match Trace::read("trace.csv", &trace, &choice, &names, &image) {
             Ok(trace) => {

@@ -76,6 +76,13 @@ fn patterns_choose_files_and_libraries_bring_their_own() {
     );
     let checked = in_folder(&scratch, &["check", "app"]);
     assert_eq!(checked.status.code(), Some(0), "{}", stderr(&checked));
+    // From outside, folders by a pattern, and no deeper than it says.
+    for (sources, status) in [("'../app/d*'", 0), ("'../*/de?p/er/*.st'", 0), ("'*/main.st'", 1), ("'d*p/**/m*'", 0)] {
+        std::fs::write(scratch.path("app/khz.toml"), format!("sources = [{sources}]\nlibraries = ['../mid']")).unwrap();
+        std::fs::write(scratch.path("app/deep/other.st"), "(* nothing *)").unwrap();
+        let checked = in_folder(&scratch, &["check", "app"]);
+        assert_eq!(checked.status.code(), Some(status), "{sources}: {}", stderr(&checked));
+    }
 }
 
 #[test]

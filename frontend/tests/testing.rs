@@ -178,6 +178,16 @@ fn more_tests_than_there_may_be_are_refused_and_not_compiled() {
 }
 
 #[test]
+fn setup_may_not_leave_and_end_the_test() {
+    let text = "SETUP VAR on : BOOL; END_VAR\nWHILE on DO IF on THEN RETURN; END_IF; END_WHILE;\nEND_SETUP\n\
+                TEST 'a' ASSERT_TRUE(FALSE); END_TEST\nTEST 'b' RETURN; END_TEST\n";
+    let found = compile_tests(&sources(text), &CompileOptions::default());
+    let told: Vec<_> =
+        found.diagnostics.iter().map(|it| (it.code(), found.sources.line_column(it.span).line)).collect();
+    assert_eq!(told, [("P0031", 2)]);
+}
+
+#[test]
 fn no_text_around_tests_hurts() {
     let text = include_str!("samples/everything.st");
     let tests = "SETUP VAR n : INT; END_VAR END_SETUP TEST 'a' MOCK n; MOCK_FUNCTION f RETURNS 1; ASSERT_EQ(n, 1, 'x'); END_TEST \

@@ -88,6 +88,13 @@ pub fn colours() -> bool {
 
 /// Writes a whole result file.
 pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    if kilohertz::files::is_source(path) || kilohertz::files::is_project(path) {
+        // A slip of the hand would cost somebody's program.
+        return Err(Failure::usage(format!(
+            "{}: results do not go where sources stand, by their ending",
+            path.display()
+        )));
+    }
     std::fs::write(path, bytes).map_err(|error| Failure::Message(Status::Host, format!("{}: {error}", path.display())))
 }
 

@@ -30,8 +30,8 @@ pub struct RandomInputs {
     names: VariableTable,
     /// What changes, and how often: percent of the rounds.
     variables: Vec<(Variable, Domain, usize)>,
-    /// %I.
-    region: Range<usize>,
+    /// %I where no variable is known by name: a stripped container's.
+    nameless: Range<usize>,
     /// Bytes that were written last.
     written: Vec<Range<usize>>,
 }
@@ -55,7 +55,8 @@ impl RandomInputs {
         let variables = leaves.filter_map(|leaf| names.domain(&leaf).map(|domain| (leaf, domain, CHANGE_PERCENT)));
         let variables = variables.collect();
         let region = layout.input.start as usize..layout.input.end as usize;
-        RandomInputs { random: Random::new(seed), names, variables, region, written: Vec::new() }
+        let nameless = if names.variables().next().is_none() { region } else { 0..0 };
+        RandomInputs { random: Random::new(seed), names, variables, nameless, written: Vec::new() }
     }
 
     /// Gives values to all other variables too, less often: states that a program would hardly come to. Those in `kept` are left alone.
@@ -77,7 +78,13 @@ impl RandomInputs {
     /// Whether there is nothing to give values to.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.variables.is_empty() && self.region.is_empty()
+        self.variables.is_empty() && self.nameless.is_empty()
+    }
+
+    /// Whether there are only bytes of %I, without variables to name them.
+    #[must_use]
+    pub fn is_nameless(&self) -> bool {
+        !self.nameless.is_empty()
     }
 
     /// The variables that get values, by name.
@@ -88,14 +95,13 @@ impl RandomInputs {
     /// Changes some inputs in the image.
     pub fn apply(&mut self, image: &mut Image) {
         self.written.clear();
-        if self.variables.iter().all(|(.., percent)| *percent != CHANGE_PERCENT) {
-            // A stripped container: %I by its bytes.
-            for byte in &mut image.bytes_mut()[self.region.clone()] {
-                if self.random.chance(CHANGE_PERCENT) {
-                    *byte = if self.random.chance(30) { 0xFF } else { self.random.bits() as u8 };
-                }
+        for byte in &mut image.bytes_mut()[self.nameless.clone()] {
+            if self.random.chance(CHANGE_PERCENT) {
+                *byte = if self.random.chance(30) { 0xFF } else { self.random.bits() as u8 };
             }
-            self.written.push(self.region.clone());
+        }
+        if !self.nameless.is_empty() {
+            self.written.push(self.nameless.clone());
         }
         for (variable, domain, percent) in &self.variables {
             if !self.random.chance(*percent) {

@@ -44,7 +44,8 @@ impl Mapping {
             let line = record.position().map_or(0, csv::Position::line);
             let wrong = |column, reason: String| TraceError::at(file, line, column, reason);
             let cell = |at: usize| record.get(at).filter(|cell| !cell.is_empty());
-            if number == 0 && cell(0).is_some_and(|name| name.eq_ignore_ascii_case("column")) {
+            let is = |at: usize, title: &str| cell(at).is_some_and(|name| name.eq_ignore_ascii_case(title));
+            if number == 0 && is(0, "column") && is(1, "variable") {
                 continue;
             }
             if record.len() > 4 {
@@ -66,6 +67,9 @@ impl Mapping {
                     .ok_or_else(|| wrong(at as u64 + 1, format!("`{text}` is not a number"))),
             };
             let (factor, offset) = (number(2, 1.0)?, number(3, 0.0)?);
+            if factor == 0.0 {
+                return Err(wrong(3, format!("a factor of 0 makes every cell of `{column}` the same")));
+            }
             if mapping.find(&column).is_some() {
                 return Err(wrong(1, format!("`{column}` stands here twice")));
             }
@@ -83,6 +87,11 @@ impl Mapping {
     #[must_use]
     pub fn find(&self, column: &str) -> Option<&Mapped> {
         self.positions.get(&column.to_ascii_lowercase()).and_then(|position| self.lines.get(*position))
+    }
+
+    /// An error in the line of a column.
+    pub(super) fn wrong(&self, mapped: &Mapped, column: u64, reason: String) -> TraceError {
+        TraceError::at(&self.file, mapped.line, column, reason)
     }
 
     /// Every line must be of a column that the trace has: a misspelt one would leave the column out without a word.

@@ -1,12 +1,14 @@
 //! Reading a trace: all checks, by line and column, before anything runs.
 
+use std::collections::BTreeMap;
+
 use khz_bytecode::container::DebugPlace;
 use khz_bytecode::value::BytePlace;
 use khz_machine::image::Image;
 use khz_machine::variables::{Domain, Variable, VariableTable};
 
 use super::mapping::{Mapped, Mapping};
-use super::sample::{Reader, Sample, Texts};
+use super::sample::{Reader, Sample, Texts, is_number};
 use super::table::{MAX_CELLS, csv_error, open};
 
 /// What is wrong with a trace or a mapping, and where.
@@ -137,11 +139,12 @@ impl Trace {
             cells: Vec::new(),
         };
         let mut readers = Vec::new();
+        let mut seen = BTreeMap::new();
         for (at, name) in header.iter().enumerate().skip(1) {
             let wrong = |reason: String| TraceError::at(file, 1, at as u64 + 1, reason);
             let mapped = choice.mapping.find(name);
             let variable = match mapped.map_or(name, |mapped| &mapped.variable) {
-                "" => Err(String::new()),
+                "" => Err("the column has no name".to_string()),
                 path => names.resolve(path).map_err(|error| error.to_string()),
             };
             let variable = match variable {
@@ -163,6 +166,13 @@ impl Trace {
                 return Err(wrong(format!("`{}` is a CONSTANT and can not be driven", variable.name)));
             }
             let scale = mapped.and_then(|mapped: &Mapped| mapped.scale);
+            if let Some(mapped) = mapped.filter(|mapped| mapped.scale.is_some() && !is_number(&domain)) {
+                let reason = format!("`{}` is no number and no time: it has neither FACTOR nor OFFSET", variable.name);
+                return Err(choice.mapping.wrong(mapped, 3, reason));
+            }
+            if let Some(twin) = seen.insert(variable.name.clone(), name) {
+                return Err(wrong(format!("`{name}` is `{}`, as column `{twin}` is already", variable.name)));
+            }
             readers.push(Reader { variable: variable.clone(), domain: domain.clone(), scale, strict: drives });
             trace.columns.push(Column { name: name.to_string(), variable, domain, drives, cell: at });
         }

@@ -9,19 +9,9 @@ use crate::syntax::ast::{
 pub(super) fn statements<'a>(block: &'a Block, visit: &mut dyn FnMut(&'a Stmt)) {
     for statement in &block.statements {
         visit(statement);
-        for inner in blocks(statement) {
+        for inner in statement.blocks() {
             statements(inner, visit);
         }
-    }
-}
-
-/// The blocks of one statement.
-pub(super) fn blocks(statement: &Stmt) -> Vec<&Block> {
-    match &statement.kind {
-        StmtKind::If { branches, otherwise } => branches.iter().map(|branch| &branch.body).chain(otherwise).collect(),
-        StmtKind::Case { arms, otherwise, .. } => arms.iter().map(|arm| &arm.body).chain(otherwise).collect(),
-        StmtKind::For { body, .. } | StmtKind::While { body, .. } | StmtKind::Repeat { body, .. } => vec![body],
-        _ => Vec::new(),
     }
 }
 

@@ -59,6 +59,7 @@ pub(crate) fn desugar(ast: &mut Ast) -> (Vec<TestUnit>, Vec<Diagnostic>) {
     let mut fixture_bytes = 0;
     for (file, suite) in ast.files.iter_mut().zip(suites) {
         warn_of_twins(&suite, &mut found);
+        found.extend(suite.setup.as_ref().and_then(leaves_early));
         for test in &suite.tests {
             fixture_bytes += fixture_size(test, &suite);
             if fixture_bytes > MAX_FIXTURE_BYTES {
@@ -119,6 +120,20 @@ fn warn_of_twins(suite: &TestSuite, found: &mut Vec<Diagnostic>) {
             found.push(twin);
         }
     }
+}
+
+/// SETUP stands before the statements of each test: a RETURN in it would end the test, which would then seem to pass.
+fn leaves_early(setup: &TestPart) -> Option<Diagnostic> {
+    let mut blocks = vec![&setup.body];
+    while let Some(block) = blocks.pop() {
+        if let Some(leaves) = block.statements.iter().find(|statement| matches!(statement.kind, StmtKind::Return)) {
+            let found =
+                Diagnostic::new(&rules::BAD_TEST, leaves.span, "RETURN in SETUP would end every test before it begins");
+            return Some(found.help("guard the rest of SETUP by an IF"));
+        }
+        blocks.extend(block.statements.iter().flat_map(Stmt::blocks));
+    }
+    None
 }
 
 /// Makes nodes of the tree.

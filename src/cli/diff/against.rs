@@ -1,5 +1,6 @@
 //! `khz diff FILE --against TRACE.csv`: the program along a trace that was recorded elsewhere.
 
+use std::fs;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -55,6 +56,13 @@ pub struct Outcomes<'o> {
 
 /// Runs it.
 pub fn run(args: &DiffArgs, path: &Path) -> Outcome {
+    if let Some(report) = &args.report {
+        let is_that =
+            |input: &Path| fs::canonicalize(input).ok().is_some_and(|it| fs::canonicalize(report).ok() == Some(it));
+        if is_that(path) || args.map.as_deref().is_some_and(is_that) {
+            return Err(Failure::usage(format!("--report {}: that is what is to be compared", report.display())));
+        }
+    }
     let mut loaded = load(&args.sources)?;
     let sources = std::mem::replace(&mut loaded.sources, SourceMap::new());
     let program = choose(loaded, args.resource.resource.as_deref())?;
@@ -95,10 +103,10 @@ pub fn run(args: &DiffArgs, path: &Path) -> Outcome {
     let file = path.display().to_string();
     let outcomes =
         Outcomes { file, trace: &trace, comparer: &comparer, offset_us, found, ended, statements, sources: &sources };
+    print(args.common.format, &outcomes);
     if let Some(path) = &args.report {
         write_file(path, curves::page(&outcomes).as_bytes())?;
     }
-    print(args.common.format, &outcomes);
     Ok(match end {
         _ if comparer.differing() > 0 => Status::Differ,
         End::Over if comparer.values() == 0 => Status::Refused,

@@ -18,6 +18,8 @@ use super::super::{Outcome, Status};
 
 /// Watchdog of the runs with fuel where nothing sets one, in microseconds: an endless loop ends, in both engines at the same place.
 const DEFAULT_WATCHDOG_US: u64 = 100_000;
+/// The same under random inputs, which may end every round so.
+const RANDOM_WATCHDOG_US: u64 = 2_000;
 /// Rounds that are compared without `--scans`.
 const DEFAULT_ROUNDS: u64 = 1000;
 /// Rounds that are run after a difference, to see what else comes to differ.
@@ -32,8 +34,13 @@ pub fn run(args: &DiffArgs) -> Outcome {
     let engines = EngineUnderTest::standard(&session.program, args.resource.max_image).map_err(refused)?;
     let mut lockstep = open(&session, engines, args.is_random())?;
     let mut inputs = random_inputs(args, &session, lockstep.image());
-    if inputs.as_ref().is_some_and(RandomInputs::is_empty) {
-        people("note: the program has no inputs: nothing is located at %I, and there is no VAR_INPUT of a program");
+    let driven = inputs.as_ref().map(|inputs| (inputs.names().count(), inputs.is_nameless()));
+    match driven {
+        Some((0, false)) => people(
+            "note: no input gets values: nothing is located at %I, and no program has VAR_INPUT, or --set holds them all",
+        ),
+        Some((0, true)) => people("note: the container names no variables: random values go to the bytes of %I"),
+        _ => {}
     }
     match lockstep.run(inputs.as_mut(), args.scans.unwrap_or(DEFAULT_ROUNDS)) {
         Ok(summary) => {
@@ -41,7 +48,11 @@ pub fn run(args: &DiffArgs) -> Outcome {
                 let ended = summary.ended.map(khz_machine::trap::TrapCode::name);
                 let traps: Value =
                     summary.traps.iter().map(|(trap, count)| (trap.name().to_string(), json!(count))).collect();
-                result(&json!({ "equal": true, "rounds": summary.rounds, "trap": ended, "traps": traps }).to_string());
+                let inputs = driven.map(|(variables, bytes)| json!({ "variables": variables, "bytes": bytes }));
+                result(
+                    &json!({ "equal": true, "rounds": summary.rounds, "trap": ended, "traps": traps, "random": inputs })
+                        .to_string(),
+                );
             } else {
                 people(&summary.text());
             }
@@ -76,7 +87,11 @@ pub fn open<'s>(
     let rows = session.inputs(&scratch)?;
     let sources = rows.iter().flat_map(|rows| std::iter::repeat_n(rows, count));
     let sources = sources.map(|rows| Box::new(rows.clone()) as Box<dyn InputSource>).collect();
-    let watchdog_us = if session.args.watchdog_us == 0 { DEFAULT_WATCHDOG_US } else { session.args.watchdog_us };
+    let watchdog_us = match session.args.watchdog_us {
+        0 if idle_goes_on => RANDOM_WATCHDOG_US,
+        0 => DEFAULT_WATCHDOG_US,
+        given => given,
+    };
     let options = Options {
         max_image_bytes: session.args.max_image,
         watchdog_us,

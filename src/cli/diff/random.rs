@@ -121,10 +121,12 @@ fn check(args: &DiffArgs, programs: Programs, seed: u64, reached: &mut Reached) 
     if let Some(found) = bench(|bench| engines_differ(bench, &text, &rounds)) {
         return Some(format!("Structured Text, {} and {}: {}", found.left, found.right, found.description));
     }
-    reached.with_inputs += 1;
+    let compared = reached.text.programs;
     if let Some(found) = meaning::check_seed(seed, meaning::Plan::default(), &mut reached.text, 0) {
         return Some(format!("Structured Text against its meaning: {}", first_lines(&found, 2)));
     }
+    // One that the compiler refused ran nowhere.
+    reached.with_inputs += reached.text.programs - compared;
     if !programs.has_container(seed) {
         return None;
     }

@@ -21,6 +21,21 @@ pub struct Stmt {
     pub span: Span,
 }
 
+impl Stmt {
+    /// The blocks in it, of every arm.
+    #[must_use]
+    pub fn blocks(&self) -> Vec<&Block> {
+        match &self.kind {
+            StmtKind::If { branches, otherwise } => {
+                branches.iter().map(|branch| &branch.body).chain(otherwise).collect()
+            }
+            StmtKind::Case { arms, otherwise, .. } => arms.iter().map(|arm| &arm.body).chain(otherwise).collect(),
+            StmtKind::For { body, .. } | StmtKind::While { body, .. } | StmtKind::Repeat { body, .. } => vec![body],
+            _ => Vec::new(),
+        }
+    }
+}
+
 /// The forms of a statement.
 #[derive(Clone, Debug)]
 pub enum StmtKind {
