@@ -47,11 +47,13 @@ fn the_library_is_documented() {
     for function in functions::TABLE {
         let parameters: Vec<&str> = function.parameters.iter().map(|parameter| parameter.name).collect();
         let more = if function.extensible { ", …" } else { "" };
+        let outputs = if function.outputs.is_empty() { "" } else { "; => " };
         let _ = writeln!(
             out,
-            "| {}({}{more}) | {} | {} |",
+            "| {}({}{more}{outputs}{}) | {} | {} |",
             function.name,
             parameters.join(", "),
+            function.outputs.join(", "),
             function.meaning,
             function.clause
         );

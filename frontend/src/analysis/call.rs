@@ -2,6 +2,8 @@
 
 use std::rc::Rc;
 
+use khz_machine::library::functions;
+
 use super::expr::{Checker, broken};
 use super::place::step;
 use super::tree::{
@@ -138,6 +140,13 @@ impl<'a> Checker<'_, 'a> {
             }
             Callee::Standard(name) => {
                 if let Some(found) = self.test_statement(&name, args, span) {
+                    return found;
+                }
+                if let Some(row) = functions::find(self.an.text(name.symbol)).filter(|row| !row.outputs.is_empty()) {
+                    let found = self.split_call(row, args, span);
+                    if found.is_none() {
+                        self.check_loose(args);
+                    }
                     return found;
                 }
                 let found = self.standard_call(&name, args, span, Ty::Void);

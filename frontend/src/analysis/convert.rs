@@ -6,7 +6,7 @@ use super::expr::Checker;
 use super::fold;
 use super::tree::{BinOp, Expr, ExprKind};
 use super::types::{
-    Const, Ty, TyKind, integer_type, is_bits, is_duration, is_integer, is_real, is_signed, limits, widen, wrap,
+    Const, Ty, TyKind, integer_type, is_bits, is_integer, is_real, is_signed, is_time, limits, long_form, widen, wrap,
 };
 use crate::diagnostics::{Rule, types as rules};
 use crate::source::Span;
@@ -29,7 +29,8 @@ pub(super) fn implicit(from: E, to: E) -> Way {
     }
     let bits = |ty: E| ty.storage().bytes() * 8;
     match (from, to) {
-        (E::Real, E::Lreal) | (E::Time, E::Ltime) => Way::Standard,
+        (E::Real, E::Lreal) => Way::Standard,
+        _ if long_form(from) == Some(to) => Way::Standard,
         (E::Lreal, E::Real) => Way::Vendor(&rules::REAL_NARROWED),
         _ if from == E::Bool && is_bits(to) => Way::Standard,
         _ if is_bits(from) && is_bits(to) => {
@@ -91,8 +92,8 @@ pub(super) fn common(a: E, b: E) -> Option<(E, Option<&'static Rule>)> {
     if a == b {
         return Some((a, None));
     }
-    if is_duration(a) && is_duration(b) {
-        return Some((E::Ltime, None));
+    if let (Some(long), Some(other)) = (long_form(a), long_form(b)) {
+        return (long == other).then_some((long, None));
     }
     if is_real(a) && is_real(b) {
         return Some((E::Lreal, None));
@@ -236,7 +237,7 @@ impl Checker<'_, '_> {
                 let (wide, narrow) = (*value as f64, *value as f32);
                 if to == E::Real { Const::F32(narrow) } else { Const::F64(wide) }
             }
-            ExprKind::Const(Const::Wide(value)) if to != E::Bool && !is_duration(to) && integer_type(to).is_some() => {
+            ExprKind::Const(Const::Wide(value)) if to != E::Bool && !is_time(to) && integer_type(to).is_some() => {
                 let (low, high) = limits(to).unwrap_or((0, 0));
                 if *value < low || *value > high {
                     let message = format!("{value} does not fit {}, which holds {low}..{high}", to.name());

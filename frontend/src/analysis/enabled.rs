@@ -24,6 +24,8 @@ pub(super) fn has_member(class: TypeClass, ty: E) -> bool {
         TypeClass::AnyMagnitude => number || is_duration(ty) || is_bits(ty),
         TypeClass::AnyNum => number || is_bits(ty),
         TypeClass::AnyReal | TypeClass::Float => is_real(ty),
+        TypeClass::Part | TypeClass::FinePart => is_integer(ty),
+        TypeClass::Of(own) => own == ty,
         TypeClass::AnyInt | TypeClass::Count | TypeClass::Shiftable => is_integer(ty) || is_bits(ty),
         TypeClass::AnyBit => ty == E::Bool || is_bits(ty) || is_integer(ty),
         TypeClass::BitString => is_bits(ty),

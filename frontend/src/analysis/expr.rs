@@ -7,7 +7,7 @@ use khz_bytecode::container::ElementaryType as E;
 
 use super::fold::{self, Unfolded};
 use super::testing::TestBody;
-use super::tree::{BinOp, Expr, ExprKind, GlobalId, PouId, PouInfo, Root, UnOp, Usage};
+use super::tree::{BinOp, Expr, ExprKind, GlobalId, PouId, PouInfo, Root, Stmt, UnOp, Usage};
 use super::types::{BOOL, Const, Ty, TyKind, Value, is_bits, is_duration, is_integer, is_real, is_signed, is_unsigned};
 use super::{Analyzer, ConstKey, TypeSource};
 use crate::diagnostics::{semantic as names, types as rules};
@@ -31,6 +31,8 @@ pub(super) struct Checker<'c, 'a> {
     pub(super) loop_depth: u32,
     /// Present in the body of a test.
     pub(super) test: Option<Box<TestBody>>,
+    /// Statements that come before the one that is being checked.
+    pub(super) pending: Vec<Stmt>,
 }
 
 /// An expression that could not be understood; it was reported.
@@ -50,6 +52,7 @@ impl<'c, 'a> Checker<'c, 'a> {
             callees: BTreeMap::new(),
             loop_depth: 0,
             test: None,
+            pending: Vec::new(),
         }
     }
 
@@ -66,6 +69,7 @@ impl<'c, 'a> Checker<'c, 'a> {
             callees: BTreeMap::new(),
             loop_depth: 0,
             test,
+            pending: Vec::new(),
         }
     }
 
@@ -159,9 +163,14 @@ impl<'c, 'a> Checker<'c, 'a> {
                 self.an.report(&names::NOT_SUPPORTED, span, "WSTRING is not of the language yet");
                 return broken(span);
             }
-            LiteralValue::Date { .. } | LiteralValue::TimeOfDay { .. } | LiteralValue::DateAndTime { .. } => {
-                self.an.report(&names::NOT_SUPPORTED, span, "dates and times of day are not of the language yet");
-                return broken(span);
+            LiteralValue::Date { long, value_ns } => {
+                (Const::Int(*value_ns), Ty::Elem(if *long { E::Ldate } else { E::Date }))
+            }
+            LiteralValue::TimeOfDay { long, value_ns } => {
+                (Const::Int(*value_ns), Ty::Elem(if *long { E::LtimeOfDay } else { E::TimeOfDay }))
+            }
+            LiteralValue::DateAndTime { long, value_ns } => {
+                (Const::Int(*value_ns), Ty::Elem(if *long { E::LdateAndTime } else { E::DateAndTime }))
             }
         };
         let found = Expr { kind: ExprKind::Const(value), ty, span };
@@ -439,7 +448,7 @@ impl<'c, 'a> Checker<'c, 'a> {
         if op == BinOp::Pow {
             return self.power(a, b, span, want);
         }
-        if let Some(found) = self.duration_op(op, &a, &b, span) {
+        if let Some(found) = self.moment_op(op, &a, &b, span).or_else(|| self.duration_op(op, &a, &b, span)) {
             return found;
         }
         let (x, y) = (a.ty, b.ty);

@@ -7,12 +7,23 @@ use khz_bytecode::instruction::NumericOp;
 use khz_bytecode::value::ValueType;
 use khz_machine::semantics::{StringPlace, Value, eval_helper, eval_numeric};
 
+use super::moments::convert_ns;
 use super::ops;
 use super::tree::{BinOp, Expr, ExprKind, TextOp, UnOp};
-use super::types::{Const, Ty, integer_type, is_duration, is_real, limits, widen, wrap};
+use super::types::{Const, Ty, integer_type, is_real, is_time, limits, widen, wrap};
 
 /// Nanoseconds in a millisecond, the unit in which TIME meets numbers.
 pub(crate) const NS_PER_MS: i64 = 1_000_000;
+
+/// Nanoseconds of the unit in which a duration, date or time of day meets numbers: TIME and TIME_OF_DAY milliseconds, DATE and DATE_AND_TIME seconds, the
+/// L-forms nanoseconds. `None`: no such type.
+pub(crate) fn unit_ns(ty: E) -> Option<i64> {
+    match ty {
+        E::Time | E::TimeOfDay => Some(NS_PER_MS),
+        E::Date | E::DateAndTime => Some(1000 * NS_PER_MS),
+        _ => is_time(ty).then_some(1),
+    }
+}
 
 /// The one NaN (architecture §5), or the value.
 pub(super) fn canonical32(value: f32) -> f32 {
@@ -252,10 +263,13 @@ pub(super) fn convert(value: &Const, from: E, to: E, truncates: bool) -> Option<
     match value {
         Const::Int(value) => {
             let mut number = widen(from, *value);
-            if is_duration(from) != is_duration(to) {
-                let (unit_from, unit_to) =
-                    (if from == E::Time { NS_PER_MS } else { 1 }, if to == E::Time { NS_PER_MS } else { 1 });
-                number = i128::from(wrap(E::Lint, number / i128::from(unit_from) * i128::from(unit_to)));
+            match (unit_ns(from), unit_ns(to)) {
+                (Some(_), Some(_)) => number = i128::from(convert_ns(*value, from, to)),
+                (Some(unit), None) => number /= i128::from(unit),
+                (None, Some(unit)) => {
+                    number = i128::from(convert_ns(wrap(E::Lint, number * i128::from(unit)), E::Ltime, to));
+                }
+                (None, None) => {}
             }
             if is_real(to) {
                 #[expect(clippy::cast_precision_loss, reason = "rounding to nearest even is the meaning")]
@@ -278,7 +292,7 @@ pub(super) fn convert(value: &Const, from: E, to: E, truncates: bool) -> Option<
 }
 
 fn float_to_integer(value: f64, to: E, truncates: bool) -> Option<Const> {
-    if to == E::Bool || is_duration(to) {
+    if to == E::Bool || is_time(to) {
         return None;
     }
     let (low, high) = limits(to)?;

@@ -23,6 +23,7 @@ mod enabled;
 mod expr;
 mod fold;
 mod init;
+mod moments;
 mod open;
 mod place;
 mod reach;
@@ -299,6 +300,6 @@ fn lost_span(declaration: &Declaration) -> Option<Span> {
     }
 }
 
-pub(crate) use fold::NS_PER_MS;
+pub(crate) use fold::{NS_PER_MS, unit_ns};
 pub(crate) use init::scalar_bytes;
 pub(crate) use tasks::parse_duration_ns;

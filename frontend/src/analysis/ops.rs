@@ -4,7 +4,7 @@ use khz_bytecode::container::ElementaryType as E;
 use khz_bytecode::instruction::{HelperOp as H, NumericOp as N};
 use khz_bytecode::value::{IntegerType, ValueType};
 
-use super::tree::{BinOp, TextOp, UnOp};
+use super::tree::{BinOp, CalendarOp, TextOp, UnOp};
 use super::types::integer_type;
 
 /// One operand.
@@ -43,6 +43,17 @@ pub(crate) fn unary(op: UnOp, ty: ValueType) -> Option<N> {
         (UnOp::Atan, F64) => N::F64Atan,
         _ => return None,
     })
+}
+
+/// A question to the calendar.
+pub(crate) fn calendar(op: CalendarOp) -> N {
+    match op {
+        CalendarOp::Year => N::DateYear,
+        CalendarOp::Month => N::DateMonth,
+        CalendarOp::Day => N::DateDay,
+        CalendarOp::Weekday => N::DateWeekday,
+        CalendarOp::Of => N::DateOf,
+    }
 }
 
 /// Two operands, of the type that decides width and sign.

@@ -18,21 +18,7 @@ use crate::syntax::ast::{ArrayDim, EnumValue, Expr, Ident, Range, TypeSpec, Type
 use crate::syntax::symbol::Symbol;
 
 /// Types of the standard that are not of the language yet.
-const LATER: &[&str] = &[
-    "WSTRING",
-    "CHAR",
-    "WCHAR",
-    "DATE",
-    "LDATE",
-    "TOD",
-    "LTOD",
-    "TIME_OF_DAY",
-    "LTIME_OF_DAY",
-    "DT",
-    "LDT",
-    "DATE_AND_TIME",
-    "LDATE_AND_TIME",
-];
+const LATER: &[&str] = &["WSTRING", "CHAR", "WCHAR"];
 
 impl<'a> Analyzer<'a> {
     /// The type and initial value that a written type stands for. `scope` is the unit whose constants it may use.

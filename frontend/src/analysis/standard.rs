@@ -1,17 +1,25 @@
 //! Calls of standard functions and conversions.
 
 use khz_bytecode::container::ElementaryType as E;
-use khz_machine::library::functions::{self, FunctionRow, ResultRule, StandardFunction as F, TypeClass};
+use khz_machine::library::functions::{self, FunctionRow, Parameter, ResultRule, StandardFunction as F, TypeClass};
 
 use super::enabled::{Arguments, has_member};
 use super::expr::{Checker, broken};
 use super::fold;
+use super::moments::is_of_moments;
 use super::testing::is_test_word;
 use super::tree::{BinOp, Expr, ExprKind, TextOp, UnOp};
-use super::types::{BOOL, Const, DINT, INT, Ty, TyKind, elementary_by_name, is_integer, is_real, widen, wrap};
+use super::types::{
+    BOOL, Const, DINT, INT, Ty, TyKind, elementary_by_name, is_integer, is_moment, is_real, widen, wrap,
+};
 use crate::diagnostics::{Diagnostic, semantic as names, types as rules};
 use crate::source::Span;
 use crate::syntax::ast::{self, Arg, ArgKind, Ident};
+
+/// Whether an argument may be left out.
+fn is_optional(parameter: &Parameter) -> bool {
+    parameter.class == TypeClass::FinePart
+}
 
 impl<'a> Checker<'_, 'a> {
     /// A call of a name that is no variable and no unit of the user.
@@ -94,6 +102,9 @@ impl<'a> Checker<'_, 'a> {
                 }
             }
         }
+        while matches!(list.last(), Some(None)) && row.parameters.get(list.len() - 1).is_some_and(is_optional) {
+            list.pop();
+        }
         let given: Option<Vec<&'a ast::Expr>> = list.into_iter().collect();
         if given.is_none() {
             self.an.report(&names::ARGUMENT_COUNT, span, format!("{} takes {fixed} arguments", row.name));
@@ -134,6 +145,8 @@ impl<'a> Checker<'_, 'a> {
             let hint = match class {
                 TypeClass::Bool => BOOL,
                 TypeClass::Count => DINT,
+                TypeClass::Of(ty) => Ty::Elem(ty),
+                TypeClass::Part | TypeClass::FinePart => Ty::Elem(E::Lint),
                 _ if typed.is_some() => typed.unwrap_or(Ty::Void),
                 _ if compares => values.first().map_or(Ty::Void, |first: &Expr| first.ty),
                 _ => hint,
@@ -147,8 +160,13 @@ impl<'a> Checker<'_, 'a> {
                 TypeClass::Bool => self.coerce(found, BOOL),
                 TypeClass::Count if matches!(row.function, F::Rol | F::Ror) => self.turns(found),
                 TypeClass::Count => self.count(found),
+                TypeClass::Of(ty) => self.coerce(found, Ty::Elem(ty)),
+                TypeClass::Part | TypeClass::FinePart => self.part_argument(found),
                 _ => found,
             };
+            if found.ty == Ty::Error {
+                return broken(span);
+            }
             values.push(found);
         }
         self.row_result(row, values, span, want)
@@ -186,6 +204,7 @@ impl<'a> Checker<'_, 'a> {
             (TypeClass::Array, ty) => {
                 matches!(self.an.types.kind(ty), Some(TyKind::Array { .. } | TyKind::Open { .. }))
             }
+            (TypeClass::Of(_), _) => true,
             (TypeClass::Float, Ty::RealLit) => true,
             (TypeClass::Float, Ty::IntLit) => false,
             (_, Ty::IntLit) => true,
@@ -193,6 +212,8 @@ impl<'a> Checker<'_, 'a> {
             _ if is_enum => false,
             // An integer becomes a float here.
             (TypeClass::AnyReal, _) => elementary.is_some_and(|ty| is_integer(ty) || is_real(ty)),
+            // Dates and times of day are summed with durations, so that there is no name with one type for it.
+            (TypeClass::AnyMagnitude, _) if elementary.is_some_and(is_moment) => true,
             _ => elementary.is_some_and(|ty| has_member(class, ty)),
         };
         if !fits {
@@ -267,6 +288,7 @@ impl<'a> Checker<'_, 'a> {
                 _ => broken(span),
             },
             F::Sel | F::Mux => self.selection(row.function, values, span, want),
+            _ if is_of_moments(row) => self.moment_call(row, values, span, want),
             _ => self.text_call(row.function, values, span),
         }
     }

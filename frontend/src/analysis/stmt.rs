@@ -23,7 +23,8 @@ impl<'a> Checker<'_, 'a> {
         let mut warned = false;
         for statement in &block.statements {
             let found = self.statement(statement);
-            let before = self.take_pending();
+            let mut before = self.take_pending();
+            before.append(&mut self.pending);
             if ended {
                 if !warned && !matches!(statement.kind, ast::StmtKind::Empty) {
                     self.an.report(&names::UNREACHABLE, statement.span, "nothing ever gets here");
@@ -132,6 +133,8 @@ impl<'a> Checker<'_, 'a> {
             let message = format!("a CASE selects by an integer or enumeration, not {}", self.an.types.name(found.ty));
             self.an.report(&rules::SELECTOR, selector.span, message);
         }
+        // What can not be selected by is reported once, not at each label again.
+        let selected = if elementary.is_some() { found.ty } else { Ty::Error };
         let mut all: Vec<(i128, i128, Span)> = Vec::new();
         let mut list = Vec::with_capacity(arms.len());
         for arm in arms {
@@ -139,11 +142,11 @@ impl<'a> Checker<'_, 'a> {
             for label in &arm.labels {
                 let (bounds, at) = match label {
                     CaseLabel::Value(value) => {
-                        let bound = self.label(value, found.ty);
+                        let bound = self.label(value, selected);
                         (bound.map(|bound| (bound, bound)), value.span)
                     }
                     CaseLabel::Range(range) => {
-                        let (low, high) = (self.label(&range.low, found.ty), self.label(&range.high, found.ty));
+                        let (low, high) = (self.label(&range.low, selected), self.label(&range.high, selected));
                         (low.zip(high), range.span)
                     }
                 };

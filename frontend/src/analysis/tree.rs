@@ -464,6 +464,8 @@ pub enum ExprKind {
     Kept,
     /// A string operation on strings and DINT numbers.
     Text(TextOp, Vec<Expr>),
+    /// What the calendar says of dates, or of numbers of months and days.
+    Calendar(CalendarOp, Vec<Expr>),
     /// A bound of the array that stands for an open one ([`TyKind::Open`](super::types::TyKind)): dimension from 0, upper or lower.
     Bound(TyId, usize, bool),
     /// A standard function that is called with EN or ENO.
@@ -575,6 +577,21 @@ impl BinOp {
     pub fn is_comparison(self) -> bool {
         matches!(self, BinOp::Eq | BinOp::Ne | BinOp::Lt | BinOp::Le | BinOp::Gt | BinOp::Ge)
     }
+}
+
+/// Questions to the calendar.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CalendarOp {
+    /// Year of a moment, a DINT as the next three.
+    Year,
+    /// Month of a moment.
+    Month,
+    /// Day of the month of a moment.
+    Day,
+    /// Day of the week of a moment.
+    Weekday,
+    /// The start of a day: months since January of the year 0 and days of the month, both LINT.
+    Of,
 }
 
 /// Operations on strings.

@@ -419,7 +419,44 @@ pub fn is_duration(ty: ElementaryType) -> bool {
     matches!(ty, ElementaryType::Time | ElementaryType::Ltime)
 }
 
-/// Width and sign of what is held in an integer register: integers, bit strings, BOOL, durations.
+/// Whether it is DATE, TIME_OF_DAY, DATE_AND_TIME or one of their L-forms.
+pub fn is_moment(ty: ElementaryType) -> bool {
+    is_date(ty) || is_time_of_day(ty) || is_date_and_time(ty)
+}
+
+/// Whether it is DATE or LDATE.
+pub fn is_date(ty: ElementaryType) -> bool {
+    matches!(ty, ElementaryType::Date | ElementaryType::Ldate)
+}
+
+/// Whether it is TIME_OF_DAY or LTIME_OF_DAY.
+pub fn is_time_of_day(ty: ElementaryType) -> bool {
+    matches!(ty, ElementaryType::TimeOfDay | ElementaryType::LtimeOfDay)
+}
+
+/// Whether it is DATE_AND_TIME or LDATE_AND_TIME.
+pub fn is_date_and_time(ty: ElementaryType) -> bool {
+    matches!(ty, ElementaryType::DateAndTime | ElementaryType::LdateAndTime)
+}
+
+/// Whether its values are nanoseconds: durations, dates, times of day.
+pub fn is_time(ty: ElementaryType) -> bool {
+    is_duration(ty) || is_moment(ty)
+}
+
+/// The L-form of a duration, date or time of day; of an L-form itself.
+pub fn long_form(ty: ElementaryType) -> Option<ElementaryType> {
+    use ElementaryType as E;
+    Some(match ty {
+        E::Time | E::Ltime => E::Ltime,
+        E::Date | E::Ldate => E::Ldate,
+        E::TimeOfDay | E::LtimeOfDay => E::LtimeOfDay,
+        E::DateAndTime | E::LdateAndTime => E::LdateAndTime,
+        _ => return None,
+    })
+}
+
+/// Width and sign of what is held in an integer register: integers, bit strings, BOOL, durations, dates and times of day.
 pub fn integer_type(ty: ElementaryType) -> Option<IntegerType> {
     use ElementaryType as E;
     Some(match ty {
@@ -429,7 +466,8 @@ pub fn integer_type(ty: ElementaryType) -> Option<IntegerType> {
         E::Uint | E::Word => IntegerType::U16,
         E::Dint => IntegerType::I32,
         E::Udint | E::Dword => IntegerType::U32,
-        E::Lint | E::Time | E::Ltime => IntegerType::I64,
+        E::Lint => IntegerType::I64,
+        _ if is_time(ty) => IntegerType::I64,
         E::Ulint | E::Lword => IntegerType::U64,
         _ => return None,
     })
@@ -470,8 +508,16 @@ pub fn wrap(ty: ElementaryType, value: i128) -> i64 {
     }
 }
 
-/// The elementary type of a keyword, in upper case. Dates and wide characters are not of the language yet.
+/// The elementary type of a keyword, in upper case. Wide characters are not of the language yet.
 pub fn elementary_by_name(name: &str) -> Option<ElementaryType> {
     use ElementaryType as E;
-    ElementaryType::ALL.iter().copied().find(|ty| ty.name() == name).filter(|ty| *ty as u8 <= E::Ltime as u8)
+    let long = match name {
+        "TIME_OF_DAY" => Some(E::TimeOfDay),
+        "LTIME_OF_DAY" => Some(E::LtimeOfDay),
+        "DATE_AND_TIME" => Some(E::DateAndTime),
+        "LDATE_AND_TIME" => Some(E::LdateAndTime),
+        _ => None,
+    };
+    let short = || ElementaryType::ALL.iter().copied().find(|ty| ty.name() == name);
+    long.or_else(short).filter(|ty| *ty as u8 <= E::LdateAndTime as u8)
 }

@@ -51,7 +51,9 @@ fn in_expr<'a>(expr: &'a Expr, visit: &mut dyn FnMut(&'a Expr)) {
             in_expr(b, visit);
         }
         ExprKind::Select(values) => values.iter().for_each(|value| in_expr(value, visit)),
-        ExprKind::Mux(values) | ExprKind::Text(_, values) => values.iter().for_each(|value| in_expr(value, visit)),
+        ExprKind::Mux(values) | ExprKind::Text(_, values) | ExprKind::Calendar(_, values) => {
+            values.iter().for_each(|value| in_expr(value, visit));
+        }
         ExprKind::Call(call) => in_call(call, visit),
         ExprKind::Enabled(enabled) => {
             enabled.en.iter().chain([&enabled.value]).for_each(|value| in_expr(value, visit));

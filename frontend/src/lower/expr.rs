@@ -6,10 +6,13 @@ use khz_bytecode::instruction::{Instruction as I, NumericOp as N};
 use khz_bytecode::value::{IntegerType, SlotPlace, ValueType};
 
 use super::body::{FunctionBuilder, Kept};
-use crate::analysis::NS_PER_MS;
 use crate::analysis::ops;
-use crate::analysis::tree::{BinOp, Expr, ExprKind, TextOp, UnOp};
-use crate::analysis::types::{Const, Ty, TyKind, integer_type, is_duration, is_real, is_signed, limits};
+use crate::analysis::tree::{BinOp, CalendarOp, Expr, ExprKind, TextOp, UnOp};
+use crate::analysis::types::{
+    Const, Ty, TyKind, integer_type, is_date, is_date_and_time, is_duration, is_real, is_signed, is_time,
+    is_time_of_day, limits,
+};
+use crate::analysis::unit_ns;
 
 impl FunctionBuilder<'_, '_> {
     pub(super) fn elementary(&self, ty: Ty) -> E {
@@ -110,6 +113,7 @@ impl FunctionBuilder<'_, '_> {
                 }
             }
             ExprKind::Text(op, parts) => self.text_scalar(*op, parts, ty),
+            ExprKind::Calendar(op, parts) => self.calendar(*op, parts),
             ExprKind::Bound(array, dim, upper) => {
                 let bounds = match self.b.project.types.kind(self.b.actual(Ty::User(*array))) {
                     Some(TyKind::Array { dims, .. }) => dims.get(*dim).copied(),
@@ -306,8 +310,8 @@ impl FunctionBuilder<'_, '_> {
             }
             return;
         }
-        if is_duration(from) || is_duration(to) {
-            self.convert_duration(from, to, truncates);
+        if is_time(from) || is_time(to) {
+            self.convert_time(from, to, truncates);
             return;
         }
         match (is_real(from), is_real(to)) {
@@ -350,23 +354,34 @@ impl FunctionBuilder<'_, '_> {
         }
     }
 
-    /// TIME meets numbers in milliseconds, LTIME in nanoseconds.
-    fn convert_duration(&mut self, from: E, to: E, truncates: bool) {
-        if is_duration(from) && is_duration(to) {
-            return;
-        }
-        if is_duration(from) {
-            if from == E::Time {
-                self.i64_const(NS_PER_MS);
-                self.numeric(N::I64DivS);
+    fn calendar(&mut self, op: CalendarOp, parts: &[Expr]) {
+        parts.iter().for_each(|part| self.value(part));
+        self.numeric(ops::calendar(op));
+    }
+
+    /// Durations, dates and times of day: among themselves, and with numbers in the unit that each type has.
+    fn convert_time(&mut self, from: E, to: E, truncates: bool) {
+        match (unit_ns(from), unit_ns(to)) {
+            (Some(_), Some(_)) if is_date(to) && !is_date(from) => self.numeric(N::DateStart),
+            (Some(_), Some(_)) if is_time_of_day(to) && (is_date(from) || is_date_and_time(from)) => {
+                self.numeric(N::DateTime);
             }
-            self.convert(E::Lint, to, truncates);
-        } else {
-            self.convert(from, E::Lint, truncates);
-            if to == E::Time {
-                self.i64_const(NS_PER_MS);
-                self.numeric(N::I64Mul);
+            (Some(unit), None) => {
+                if unit > 1 {
+                    self.i64_const(unit);
+                    self.numeric(N::I64DivS);
+                }
+                self.convert(E::Lint, to, truncates);
             }
+            (None, Some(unit)) => {
+                self.convert(from, E::Lint, truncates);
+                if unit > 1 {
+                    self.i64_const(unit);
+                    self.numeric(N::I64Mul);
+                }
+                self.convert_time(E::Ltime, to, truncates);
+            }
+            _ => {}
         }
     }
 
@@ -387,6 +402,9 @@ impl FunctionBuilder<'_, '_> {
                     E::Real => (H::StringToF32, E::Real),
                     E::Lreal => (H::StringToF64, E::Lreal),
                     E::Time | E::Ltime => (H::StringToTime, ty),
+                    _ if is_date(ty) => (H::StringToDate, ty),
+                    _ if is_time_of_day(ty) => (H::StringToTod, ty),
+                    _ if is_date_and_time(ty) => (H::StringToDt, ty),
                     _ if is_signed(ty) => (H::StringToI64, E::Lint),
                     _ => (H::StringToU64, E::Ulint),
                 };

@@ -6,7 +6,7 @@ use khz_bytecode::value::{BytePlace, SlotPlace, Storage};
 use super::body::{FunctionBuilder, Kept};
 use crate::analysis::ops;
 use crate::analysis::tree::{BinOp, Expr, ExprKind, Place, TextOp};
-use crate::analysis::types::{Const, Ty, is_duration, is_real, is_signed};
+use crate::analysis::types::{Const, Ty, is_date, is_date_and_time, is_duration, is_real, is_signed, is_time_of_day};
 use khz_bytecode::container::ElementaryType as E;
 
 fn capacity(ty: Ty) -> u16 {
@@ -146,6 +146,9 @@ impl FunctionBuilder<'_, '_> {
                     E::Real => H::StringFromF32,
                     E::Lreal => H::StringFromF64,
                     _ if is_duration(from) => H::StringFromTime,
+                    _ if is_date(from) => H::StringFromDate,
+                    _ if is_time_of_day(from) => H::StringFromTod,
+                    _ if is_date_and_time(from) => H::StringFromDt,
                     _ if is_signed(from) => {
                         self.convert(from, E::Lint, false);
                         H::StringFromI64

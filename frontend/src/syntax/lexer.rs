@@ -70,13 +70,13 @@ pub enum TokenKind {
     #[regex(r"(?i:L?TIME|L?T)#[+-]?[0-9][0-9A-Za-z_]*(\.[0-9A-Za-z_]+)*")]
     Time,
     /// `D#2024-02-29`.
-    #[regex(r"(?i:L?DATE|L?D)#[0-9][0-9-]*")]
+    #[regex(r"(?i:L?DATE|L?D)#[0-9]+(-[0-9]+)*")]
     Date,
     /// `TOD#12:30:00.5`.
     #[regex(r"(?i:L?TIME_OF_DAY|L?TOD)#[0-9]+(:[0-9]+)*(\.[0-9]+)?")]
     TimeOfDay,
     /// `DT#2024-02-29-12:30:00`.
-    #[regex(r"(?i:L?DATE_AND_TIME|L?DT)#[0-9][0-9-]*(:[0-9]+)*(\.[0-9]+)?")]
+    #[regex(r"(?i:L?DATE_AND_TIME|L?DT)#[0-9]+(-[0-9]+)*(:[0-9]+)*(\.[0-9]+)?")]
     DateAndTime,
     /// `'text'`.
     #[token("'", single_quoted)]
@@ -416,6 +416,7 @@ mod tests {
         for text in ["DT#2024-02-29-12:30:00.25", "DATE_AND_TIME#2024-2-9-1:2:3", "LDT#2024-02-29-0:0:0"] {
             assert_eq!(all(text), [(DateAndTime, text)]);
         }
+        assert_eq!(all("D#2024-02-29-d"), [(Date, "D#2024-02-29"), (TokenKind::Minus, "-"), (Ident, "d")]);
         assert_eq!(kinds("T#red"), [Ident, TokenKind::Hash, Ident], "a type may be named T");
         assert_eq!(kinds("time_of_day"), [Ident]);
     }

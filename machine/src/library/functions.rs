@@ -3,6 +3,8 @@
 //! Conversions (`INT_TO_REAL`, `TO_REAL`, `REAL_TRUNC_DINT`) are not rows: there are hundreds, all with the shape that
 //! [`conversion`] takes apart.
 
+use khz_bytecode::container::ElementaryType;
+
 /// What types a parameter takes (IEC 61131-3 figure 11).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TypeClass {
@@ -34,13 +36,28 @@ pub enum TypeClass {
     Count,
     /// A whole array.
     Array,
+    /// A value of one type, or what becomes one by itself.
+    Of(ElementaryType),
+    /// An integer of any type: a year, an hour and the like.
+    Part,
+    /// As [`TypeClass::Part`], 0 where it and all behind it are left out.
+    FinePart,
 }
 
 impl TypeClass {
     /// Whether all parameters of such classes are brought to one common type.
     #[must_use]
     pub fn is_generic(self) -> bool {
-        !matches!(self, TypeClass::Bool | TypeClass::Count | TypeClass::AnyString | TypeClass::Array)
+        !matches!(
+            self,
+            TypeClass::Bool
+                | TypeClass::Count
+                | TypeClass::AnyString
+                | TypeClass::Array
+                | TypeClass::Of(_)
+                | TypeClass::Part
+                | TypeClass::FinePart
+        )
     }
 
     /// How messages call it.
@@ -59,8 +76,9 @@ impl TypeClass {
             TypeClass::Shiftable => "a bit string or integer",
             TypeClass::AnyString => "a STRING",
             TypeClass::Bool => "a BOOL",
-            TypeClass::Count => "an integer",
+            TypeClass::Count | TypeClass::Part | TypeClass::FinePart => "an integer",
             TypeClass::Array => "an array",
+            TypeClass::Of(ty) => ty.name(),
         }
     }
 }
@@ -80,6 +98,10 @@ pub enum ResultRule {
     String,
     /// The integer type that the place of the call wants, DINT where it wants none.
     WantedInteger,
+    /// A value of one type.
+    Of(ElementaryType),
+    /// None: the outputs say it.
+    Nothing,
 }
 
 /// A parameter.
@@ -100,6 +122,8 @@ pub struct FunctionRow {
     pub name: &'static str,
     /// Its parameters; of an extensible one the last stands for one or more.
     pub parameters: &'static [Parameter],
+    /// Names of its outputs, each an integer of any type.
+    pub outputs: &'static [&'static str],
     /// Whether the last parameter may be repeated. `IN`, then, means `IN1`, `IN2` and so on.
     pub extensible: bool,
     /// Type of the result.
@@ -111,7 +135,8 @@ pub struct FunctionRow {
 }
 
 macro_rules! functions {
-    ($(($variant:ident $name:literal [$($parameter:literal $class:ident),*] $($more:ident)? -> $result:ident, $meaning:literal, $clause:literal)),* $(,)?) => {
+    ($(($variant:ident $name:literal [$($parameter:literal $class:ident $(($class_of:ident))?),*] $(=> [$($output:literal),*])? $($more:ident)?
+        -> $result:ident $(($result_of:ident))?, $meaning:literal, $clause:literal)),* $(,)?) => {
         /// Every standard function that is a row.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
         pub enum StandardFunction { $(#[doc = $meaning] $variant),* }
@@ -120,9 +145,10 @@ macro_rules! functions {
         pub static TABLE: &[FunctionRow] = &[$(FunctionRow {
             function: StandardFunction::$variant,
             name: $name,
-            parameters: &[$(Parameter { name: $parameter, class: TypeClass::$class }),*],
+            parameters: &[$(Parameter { name: $parameter, class: TypeClass::$class $((ElementaryType::$class_of))? }),*],
+            outputs: &[$($($output),*)?],
             extensible: functions!(@more $($more)?),
-            result: ResultRule::$result,
+            result: ResultRule::$result $((ElementaryType::$result_of))?,
             meaning: $meaning,
             clause: $clause,
         }),*];
@@ -182,6 +208,39 @@ functions! {
     (LowerBound "LOWER_BOUND" ["ARR" Array, "DIM" Count] -> Dint, "The lowest index of dimension DIM, counted from 1.", "table 15"),
     (UpperBound "UPPER_BOUND" ["ARR" Array, "DIM" Count] -> Dint, "The highest index of dimension DIM, counted from 1.", "table 15"),
     (Find "FIND" ["IN1" AnyString, "IN2" AnyString] -> Int, "Position of IN2 in IN1, 0 if it is not there.", "table 34"),
+    (AddTodTime "ADD_TOD_TIME" ["IN1" Of(TimeOfDay), "IN2" Of(Time)] -> Of(TimeOfDay), "Sum; it may lie outside a day.", "table 35"),
+    (AddLtodLtime "ADD_LTOD_LTIME" ["IN1" Of(LtimeOfDay), "IN2" Of(Ltime)] -> Of(LtimeOfDay), "Sum; it may lie outside a day.", "table 35"),
+    (AddDtTime "ADD_DT_TIME" ["IN1" Of(DateAndTime), "IN2" Of(Time)] -> Of(DateAndTime), "Sum.", "table 35"),
+    (AddLdtLtime "ADD_LDT_LTIME" ["IN1" Of(LdateAndTime), "IN2" Of(Ltime)] -> Of(LdateAndTime), "Sum.", "table 35"),
+    (SubDateDate "SUB_DATE_DATE" ["IN1" Of(Date), "IN2" Of(Date)] -> Of(Time), "How long IN1 is after IN2.", "table 35"),
+    (SubLdateLdate "SUB_LDATE_LDATE" ["IN1" Of(Ldate), "IN2" Of(Ldate)] -> Of(Ltime), "How long IN1 is after IN2.", "table 35"),
+    (SubTodTime "SUB_TOD_TIME" ["IN1" Of(TimeOfDay), "IN2" Of(Time)] -> Of(TimeOfDay), "Difference; it may lie outside a day.", "table 35"),
+    (SubLtodLtime "SUB_LTOD_LTIME" ["IN1" Of(LtimeOfDay), "IN2" Of(Ltime)] -> Of(LtimeOfDay), "Difference; it may lie outside a day.", "table 35"),
+    (SubTodTod "SUB_TOD_TOD" ["IN1" Of(TimeOfDay), "IN2" Of(TimeOfDay)] -> Of(Time), "How long IN1 is after IN2.", "table 35"),
+    (SubLtodLtod "SUB_LTOD_LTOD" ["IN1" Of(LtimeOfDay), "IN2" Of(LtimeOfDay)] -> Of(Ltime), "How long IN1 is after IN2.", "table 35"),
+    (SubDtTime "SUB_DT_TIME" ["IN1" Of(DateAndTime), "IN2" Of(Time)] -> Of(DateAndTime), "Difference.", "table 35"),
+    (SubLdtLtime "SUB_LDT_LTIME" ["IN1" Of(LdateAndTime), "IN2" Of(Ltime)] -> Of(LdateAndTime), "Difference.", "table 35"),
+    (SubDtDt "SUB_DT_DT" ["IN1" Of(DateAndTime), "IN2" Of(DateAndTime)] -> Of(Time), "How long IN1 is after IN2.", "table 35"),
+    (SubLdtLdt "SUB_LDT_LDT" ["IN1" Of(LdateAndTime), "IN2" Of(LdateAndTime)] -> Of(Ltime), "How long IN1 is after IN2.", "table 35"),
+    (Multime "MULTIME" ["IN1" Of(Time), "IN2" AnyNum] -> Of(Time), "Product, as Edition 2 spells it.", "table 35"),
+    (Divtime "DIVTIME" ["IN1" Of(Time), "IN2" AnyNum] -> Of(Time), "Quotient, as Edition 2 spells it.", "table 35"),
+    (ConcatDateTod "CONCAT_DATE_TOD" ["DATE" Of(Date), "TOD" Of(TimeOfDay)] -> Of(DateAndTime), "The moment on a day.", "table 36"),
+    (ConcatDateLtod "CONCAT_DATE_LTOD" ["DATE" Of(Date), "LTOD" Of(LtimeOfDay)] -> Of(LdateAndTime), "The moment on a day.", "table 36"),
+    (ConcatLdateTod "CONCAT_LDATE_TOD" ["LDATE" Of(Ldate), "TOD" Of(TimeOfDay)] -> Of(LdateAndTime), "The moment on a day.", "table 36"),
+    (ConcatLdateLtod "CONCAT_LDATE_LTOD" ["LDATE" Of(Ldate), "LTOD" Of(LtimeOfDay)] -> Of(LdateAndTime), "The moment on a day.", "table 36"),
+    (ConcatDate "CONCAT_DATE" ["YEAR" Part, "MONTH" Part, "DAY" Part] -> Of(Date), "A day of the calendar; months and days beyond their ends count on.", "table 36"),
+    (ConcatLdate "CONCAT_LDATE" ["YEAR" Part, "MONTH" Part, "DAY" Part] -> Of(Ldate), "A day of the calendar; months and days beyond their ends count on.", "table 36"),
+    (ConcatTod "CONCAT_TOD" ["HOUR" Part, "MINUTE" Part, "SECOND" Part, "MILLISECOND" Part] -> Of(TimeOfDay), "A time of day; parts beyond their ends count on.", "table 36"),
+    (ConcatLtod "CONCAT_LTOD" ["HOUR" Part, "MINUTE" Part, "SECOND" Part, "MILLISECOND" Part, "MICROSECOND" FinePart, "NANOSECOND" FinePart] -> Of(LtimeOfDay), "A time of day; parts beyond their ends count on.", "table 36"),
+    (ConcatDt "CONCAT_DT" ["YEAR" Part, "MONTH" Part, "DAY" Part, "HOUR" Part, "MINUTE" Part, "SECOND" Part, "MILLISECOND" Part] -> Of(DateAndTime), "A moment; parts beyond their ends count on.", "table 36"),
+    (ConcatLdt "CONCAT_LDT" ["YEAR" Part, "MONTH" Part, "DAY" Part, "HOUR" Part, "MINUTE" Part, "SECOND" Part, "MILLISECOND" Part, "MICROSECOND" FinePart, "NANOSECOND" FinePart] -> Of(LdateAndTime), "A moment; parts beyond their ends count on.", "table 36"),
+    (SplitDate "SPLIT_DATE" ["IN" Of(Date)] => ["YEAR", "MONTH", "DAY"] -> Nothing, "The parts of a day.", "table 36"),
+    (SplitLdate "SPLIT_LDATE" ["IN" Of(Ldate)] => ["YEAR", "MONTH", "DAY"] -> Nothing, "The parts of a day.", "table 36"),
+    (SplitTod "SPLIT_TOD" ["IN" Of(TimeOfDay)] => ["HOUR", "MINUTE", "SECOND", "MILLISECOND"] -> Nothing, "The parts of a time of day, each with its sign.", "table 36"),
+    (SplitLtod "SPLIT_LTOD" ["IN" Of(LtimeOfDay)] => ["HOUR", "MINUTE", "SECOND", "MILLISECOND", "MICROSECOND", "NANOSECOND"] -> Nothing, "The parts of a time of day, each with its sign.", "table 36"),
+    (SplitDt "SPLIT_DT" ["IN" Of(DateAndTime)] => ["YEAR", "MONTH", "DAY", "HOUR", "MINUTE", "SECOND", "MILLISECOND"] -> Nothing, "The parts of a moment.", "table 36"),
+    (SplitLdt "SPLIT_LDT" ["IN" Of(LdateAndTime)] => ["YEAR", "MONTH", "DAY", "HOUR", "MINUTE", "SECOND", "MILLISECOND", "MICROSECOND", "NANOSECOND"] -> Nothing, "The parts of a moment.", "table 36"),
+    (DayOfWeek "DAY_OF_WEEK" ["IN" Of(Ldate)] -> WantedInteger, "0 on a Sunday to 6 on a Saturday.", "table 36"),
     (ToBigEndian "TO_BIG_ENDIAN" ["IN" Bytes] -> Generic, "The bytes in the order of a big-endian peer.", "table 37"),
     (ToLittleEndian "TO_LITTLE_ENDIAN" ["IN" Bytes] -> Generic, "The bytes in the order of a little-endian peer, which is that of the machine.", "table 37"),
     (BigEndianTo "BIG_ENDIAN_TO" ["IN" Bytes] -> Generic, "The value of bytes that stand in big-endian order.", "table 37"),

@@ -20,7 +20,9 @@ fn gives(row: &FunctionRow, kind: Kind) -> bool {
             }
         }
         // What it gives hangs on the place: see `conversion`.
-        ResultRule::WantedInteger | ResultRule::String | ResultRule::Dint => false,
+        ResultRule::WantedInteger | ResultRule::String | ResultRule::Dint | ResultRule::Of(_) | ResultRule::Nothing => {
+            false
+        }
     }
 }
 

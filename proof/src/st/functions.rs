@@ -27,8 +27,9 @@ pub fn takes(class: TypeClass, kind: Kind) -> bool {
         TypeClass::Bytes => !kind.is_real(),
         TypeClass::AnyInt | TypeClass::Shiftable | TypeClass::Count => kind.is_integer() || kind.is_bits(),
         TypeClass::AnyBit => kind == Kind::Bool || kind.is_integer() || kind.is_bits(),
+        TypeClass::Part | TypeClass::FinePart => kind.is_integer(),
         TypeClass::Bool => kind == Kind::Bool,
-        TypeClass::AnyString | TypeClass::Array => false,
+        TypeClass::AnyString | TypeClass::Array | TypeClass::Of(_) => false,
     }
 }
 

@@ -6,7 +6,7 @@ use super::{constant, load};
 use crate::analysis::expr::Checker;
 use crate::analysis::place::step;
 use crate::analysis::tree::{BinOp, Expr, ExprKind, Place, Step, Stmt, UnOp};
-use crate::analysis::types::{BOOL, Const, DINT, Ty, TyKind, is_duration, is_integer, is_real};
+use crate::analysis::types::{BOOL, Const, DINT, Ty, TyKind, is_integer, is_real, is_time};
 use crate::diagnostics::semantic as rules;
 use crate::source::Span;
 use crate::syntax::ast::{self, Arg};
@@ -169,7 +169,7 @@ impl<'a> Checker<'_, 'a> {
         let (a, b) = (self.expr(a, Ty::Void), self.expr(b, Ty::Void));
         let (x, y) = (a.ty, b.ty);
         let Some((a, b)) = self.meet(a, b, span) else { return self.no_comparison("ASSERT_NEAR", x, y, span) };
-        let number = |ty: E| is_integer(ty) || is_real(ty) || is_duration(ty);
+        let number = |ty: E| is_integer(ty) || is_real(ty) || is_time(ty);
         let elementary = self.an.types.elementary(a.ty).filter(|ty| number(*ty) && !self.is_enum(a.ty));
         if a.ty == Ty::Error || b.ty == Ty::Error {
             return None;

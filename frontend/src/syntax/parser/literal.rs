@@ -1,5 +1,7 @@
 //! Literals and direct addresses (IEC 61131-3 6.3 and 6.5.5): the value of a token.
 
+use khz_machine::semantics::{DAY_NS, parse_date, parse_date_and_time, parse_time_of_day};
+
 use super::Parser;
 use super::expr::access_size;
 use crate::diagnostics::{Diagnostic, Rule, syntax as rules};
@@ -10,9 +12,6 @@ use crate::syntax::lexer::TokenKind;
 
 /// What is wrong with a literal: the rule, the message, the help.
 type Fault = (&'static Rule, String, Option<&'static str>);
-
-/// Nanoseconds of a day.
-const DAY_NS: i128 = 86_400_000_000_000;
 
 impl Parser<'_> {
     /// `literal = [ sign ] token`; the type and its `#` have been read. None if it has been reported.
@@ -160,7 +159,7 @@ fn real(text: &str, negative: bool) -> Result<LiteralValue, Fault> {
 
 /// The units of a time literal with their nanoseconds, largest first.
 const TIME_UNITS: [(&str, i128); 7] = [
-    ("D", DAY_NS),
+    ("D", DAY_NS as i128),
     ("H", 3_600_000_000_000),
     ("M", 60_000_000_000),
     ("S", 1_000_000_000),
@@ -235,65 +234,24 @@ fn is_long(prefix: &str) -> bool {
 fn date(kind: TokenKind, text: &str) -> Result<LiteralValue, Fault> {
     let (prefix, body) = text.split_once('#').unwrap_or((text, ""));
     let long = is_long(prefix);
-    let bad = |what: &str| {
-        let help = "dates look like `D#2024-02-29`, `TOD#12:30:00.5`, `DT#2024-02-29-12:30:00`";
-        (&rules::BAD_DATE, format!("`{body}` is no {what}"), Some(help))
-    };
-    let fit = |value_ns: i128| i64::try_from(value_ns).map_err(|_| too_large(text));
-    match kind {
-        TokenKind::Date => {
-            let value_ns = fit(date_ns(body).ok_or_else(|| bad("date"))?)?;
-            Ok(LiteralValue::Date { long, value_ns })
-        }
+    let inside = 0..i128::from(DAY_NS);
+    let (parsed, what) = match kind {
+        TokenKind::Date => (parse_date(body.as_bytes()), "date"),
         TokenKind::TimeOfDay => {
-            let value_ns = fit(time_of_day_ns(body).ok_or_else(|| bad("time of day"))?)?;
-            Ok(LiteralValue::TimeOfDay { long, value_ns })
+            (parse_time_of_day(body.as_bytes()).filter(|(ns, _)| inside.contains(ns)), "time of day")
         }
-        _ => {
-            let parts = body.rsplit_once('-').and_then(|(day, time)| Some(date_ns(day)? + time_of_day_ns(time)?));
-            let value_ns = fit(parts.ok_or_else(|| bad("date with a time of day"))?)?;
-            Ok(LiteralValue::DateAndTime { long, value_ns })
-        }
-    }
-}
-
-/// `year-month-day` in nanoseconds since 1970-01-01.
-fn date_ns(text: &str) -> Option<i128> {
-    let mut parts = text.split('-').map(|part| part.parse::<u32>().ok());
-    let (year, month, day) = (parts.next()??, parts.next()??, parts.next()??);
-    let leap = year % 4 == 0 && (year % 100 != 0 || year % 400 == 0);
-    let days_of_month = match month {
-        2 if leap => 29,
-        2 => 28,
-        4 | 6 | 9 | 11 => 30,
-        1..=12 => 31,
-        _ => return None,
+        _ => (parse_date_and_time(body.as_bytes()), "date with a time of day"),
     };
-    if parts.next().is_some() || !(1..=days_of_month).contains(&day) || year > 9999 {
-        return None;
-    }
-    Some(days_since_1970(i64::from(year), i64::from(month), i64::from(day)) * DAY_NS)
-}
-
-/// Days from 1970-01-01 to a day of the Gregorian calendar. Years are counted from March, so that the leap day is last.
-fn days_since_1970(year: i64, month: i64, day: i64) -> i128 {
-    let (year, month) = if month > 2 { (year, month - 3) } else { (year - 1, month + 9) };
-    let leap_days = year.div_euclid(4) - year.div_euclid(100) + year.div_euclid(400);
-    let days_before_month = (month * 153 + 2) / 5;
-    // 719_468 days lie between March 1st of the year 0 and 1970-01-01.
-    i128::from(year * 365 + leap_days + days_before_month + day - 1 - 719_468)
-}
-
-/// `hour:minute[:second[.fraction]]` in nanoseconds since midnight.
-fn time_of_day_ns(text: &str) -> Option<i128> {
-    let mut parts = text.split(':');
-    let hour: u8 = parts.next()?.parse().ok().filter(|&hour| hour < 24)?;
-    let minute: u8 = parts.next()?.parse().ok().filter(|&minute| minute < 60)?;
-    let second_ns = scaled(parts.next().unwrap_or("0"), 1_000_000_000).filter(|&ns| ns < 60_000_000_000)?;
-    if parts.next().is_some() {
-        return None;
-    }
-    Some(i128::from(hour) * 3_600_000_000_000 + i128::from(minute) * 60_000_000_000 + second_ns)
+    let Some((value_ns, _)) = parsed.filter(|(_, used)| *used == body.len()) else {
+        let help = "dates look like `D#2024-02-29`, `TOD#12:30:00.5`, `DT#2024-02-29-12:30:00`";
+        return Err((&rules::BAD_DATE, format!("`{body}` is no {what}"), Some(help)));
+    };
+    let value_ns = i64::try_from(value_ns).map_err(|_| too_large(text))?;
+    Ok(match kind {
+        TokenKind::Date => LiteralValue::Date { long, value_ns },
+        TokenKind::TimeOfDay => LiteralValue::TimeOfDay { long, value_ns },
+        _ => LiteralValue::DateAndTime { long, value_ns },
+    })
 }
 
 /// The characters of a quoted text with its `$` escapes resolved (IEC 61131-3 tables 6 and 7), each given to `put`.
