@@ -13,7 +13,9 @@ const ROUNDS: u64 = 50;
 fn no_program_that_there_is_differs() {
     let files: Vec<_> = everything::folders(&root()).iter().flat_map(|folder| everything::sources(folder)).collect();
     let tally = everything::run_all(&files, ROUNDS, 1, 2);
-    assert!(tally.wrong.is_empty(), "{} programs:\n{}", tally.wrong.len(), tally.wrong.join("\n"));
+    for (what, wrong) in [("programs differ", &tally.differences), ("files are refused", &tally.refusals)] {
+        assert!(wrong.is_empty(), "{} {what}:\n{}", wrong.len(), wrong.join("\n"));
+    }
     // A comparison that compares nothing would be quiet too.
     assert!(tally.programs >= 800 && tally.with_inputs >= 3, "{tally:?}");
     assert!(tally.rounds + tally.ended * ROUNDS >= tally.programs * ROUNDS, "{tally:?}");

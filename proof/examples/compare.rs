@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use khz_proof::bytecode::{Size, generate, generate_sized};
 use khz_proof::campaign::Report;
-use khz_proof::harness::engines::Engines;
+use khz_proof::harness::engines::{self, Engines};
 use khz_proof::oracle::{Plan, compare, reduce};
 use khz_proof::statistics::Statistics;
 
@@ -17,7 +17,19 @@ use khz_proof::statistics::Statistics;
 const REDUCED: usize = 6;
 
 fn main() -> ExitCode {
-    let arguments = common::Arguments::read(1000, &["scans", "cuts", "size", "parts"]);
+    let arguments = common::Arguments::read(
+        1000,
+        &common::Known {
+            options: &[
+                ("scans", 1..=10_000),
+                ("cuts", 0..=10_000),
+                ("size", 0..=Size::ALL.len() as u64 - 1),
+                ("parts", 1..=1 << 20),
+            ],
+            words: &engines::makers().iter().map(|maker| maker.name).collect::<Vec<_>>(),
+            folders: false,
+        },
+    );
     let plan = |seed| Plan {
         seed,
         scans: arguments.option("scans", 10) as u32,

@@ -17,7 +17,7 @@ use khz_proof::statistics::Statistics;
 static ALLOCATOR: guarded::Guarded = guarded::Guarded;
 
 fn main() -> ExitCode {
-    let arguments = common::Arguments::read(1000, &[]);
+    let arguments = common::Arguments::read(1000, &common::Known::default());
     let report: Report<Statistics> = arguments.search(guarded_search::look);
     for finding in &report.findings {
         println!("==== seed {}: {}", finding.seed, finding.description);

@@ -1,9 +1,10 @@
 //! Spoils containers: `mutants FIRST_SEED COUNT [--threads N] [FOLDER]…` reads and verifies a mutant of each seed, of containers generated, assembled and compiled
 //! from the repository's and further folders' programs; `mutants FIRST_SEED COUNT run` runs those that verify in all engines.
 //!
-//! A panic, more than a second or more than 256 MiB for one mutant is a finding; its mutant is written to `mutant-SEED.iplc`.
-//! A count of 1 writes the mutant to `mutant.iplc`.
-#![allow(clippy::print_stdout, reason = "a program for people")]
+//! A panic, more than a second or more than 256 MiB for one mutant is a finding; its mutant is written to `mutant-SEED.iplc`. One that runs for 10 s is named and
+//! ends the search. A count of 1 writes the mutant to `mutant.iplc`. A seed means the same mutant only with the same folders. With `run` a
+//! difference is a finding, too; the container that shows it is written to `mutant-SEED.iplc`, made small to `small-SEED.iplc`.
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "a program for people")]
 
 #[path = "../tests/common/bases.rs"]
 mod bases;
@@ -15,7 +16,8 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
 
-use common::Arguments;
+use common::{Arguments, Known};
+use khz_bytecode::container::write;
 use khz_proof::campaign::Figures;
 use khz_proof::harness::engines;
 use khz_proof::mutate::{Tally, accepted};
@@ -41,22 +43,25 @@ impl Figures for Seen {
 }
 
 fn main() -> ExitCode {
-    let mut arguments = Arguments::read(10_000, &[]);
-    let words = std::mem::take(&mut arguments.words);
-    if words.iter().any(|word| word == "run") {
-        run(&arguments)
-    } else {
-        let folders: Vec<PathBuf> = words.iter().map(PathBuf::from).collect();
-        verify(&arguments, &folders)
+    let known = Known { words: &["run"], folders: true, ..Known::default() };
+    let arguments = Arguments::read(10_000, &known);
+    match (arguments.has("run"), arguments.folders()) {
+        (true, []) => run(&arguments),
+        (false, folders) => verify(&arguments, folders),
+        (true, _) => {
+            eprintln!("`run` makes its mutants of generated containers: there is no use for a folder");
+            ExitCode::from(2)
+        }
     }
 }
 
 fn verify(arguments: &Arguments, folders: &[PathBuf]) -> ExitCode {
     let pool = bases::pool(GENERATED, &bases::texts(0, folders));
     println!("{} containers, smallest, middle and largest of {:?} bytes", pool.len(), pool.sizes());
+    let watch = measure::no_hang("mutants", common::LATE_S);
     let report = arguments.search(|seed: u64, seen: &mut Seen| {
         let mutant = pool.mutant(seed);
-        let (verdict, cost) = measure::measure(|| mutant.classify());
+        let (verdict, cost) = measure::measure(&watch, seed, || mutant.classify());
         seen.tally.count_mutant(&mutant, &verdict);
         seen.costs.count(seed, cost);
         cost.finding()
@@ -101,8 +106,14 @@ fn run(arguments: &Arguments) -> ExitCode {
             let Some(found) = compare(&verified, &makers, &plan, &mut ran.statistics).difference() else { continue };
             let only: Vec<_> = engines::makers().into_iter().filter(|maker| maker.name == found.engine).collect();
             let (shrunk, description) = reduce(&verified, &only, &plan, 2000);
+            let written =
+                [("mutant", verified.container()), ("small", shrunk.verified.container())].map(|(name, container)| {
+                    let path = format!("{name}-{seed}.iplc");
+                    let bytes = write(container).unwrap_or_default();
+                    format!("{path}: {:?}", std::fs::write(&path, bytes))
+                });
             return Some(format!(
-                "mutant {number}: {}\n{} instructions\n{description}",
+                "mutant {number}: {}\n{} instructions\n{description}\n{written:?}",
                 found.description, shrunk.instructions
             ));
         }

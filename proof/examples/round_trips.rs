@@ -10,7 +10,7 @@ use khz_proof::campaign::Report;
 use khz_proof::harness::round_trips::{Tally, check_seed};
 
 fn main() -> ExitCode {
-    let report: Report<Tally> = common::Arguments::read(1000, &[]).search(check_seed);
+    let report: Report<Tally> = common::Arguments::read(1000, &common::Known::default()).search(check_seed);
     for finding in &report.findings {
         println!("==== {}", finding.description);
     }

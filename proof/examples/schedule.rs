@@ -15,7 +15,7 @@ use khz_proof::harness::schedule::{Tally, check_seed};
 const TRIES: usize = 1000;
 
 fn main() -> ExitCode {
-    let arguments = Arguments::read(1000, &[]);
+    let arguments = Arguments::read(1000, &common::Known::default());
     let report = arguments.search(|seed, tally: &mut Tally| check_seed(seed, &engines::makers(), tally, TRIES));
     for finding in &report.findings {
         println!("==== {}", finding.description);

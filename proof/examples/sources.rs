@@ -1,7 +1,8 @@
 //! Spoils Structured Text and checks it as `khz check` does, every diagnostic rendered: `sources FIRST_SEED COUNT [--threads N] [FOLDER]…`, from the repository's programs,
 //! generated ones, and those of further folders. A count of 1 writes the text to `source.st`.
 //!
-//! A panic, more than a second or more than 256 MiB for one source is a finding; its text is written to `source-SEED.st`.
+//! A panic, more than a second or more than 256 MiB for one source is a finding; its text is written to `source-SEED.st`. One that runs for 10 s is named and ends the
+//! search. A seed means the same source only with the same folders.
 #![allow(clippy::print_stdout, reason = "a program for people")]
 
 #[path = "../tests/common/bases.rs"]
@@ -12,14 +13,14 @@ mod common;
 #[path = "../tests/common/measure.rs"]
 mod measure;
 
-use std::path::PathBuf;
 use std::process::ExitCode;
 
 use checked::Checked;
-use common::Arguments;
+use common::{Arguments, Known};
 use khz_frontend::on_large_stack;
 use khz_proof::campaign::{Figures, Finding};
 use khz_proof::mutate::source::mutant;
+use khz_proof::watch::Watch;
 
 /// Generated programs among the texts.
 const GENERATED: u64 = 300;
@@ -42,16 +43,14 @@ impl Figures for Seen {
 }
 
 fn main() -> ExitCode {
-    let mut arguments = Arguments::read(10_000, &[]);
+    let arguments = Arguments::read(10_000, &Known { folders: true, ..Known::default() });
     let (first, count) = (arguments.first, arguments.count);
-    let folders: Vec<PathBuf> = arguments.words.iter().map(PathBuf::from).collect();
-    let texts = bases::texts(GENERATED, &folders);
+    let texts = bases::texts(GENERATED, arguments.folders());
     println!("{} texts, {} bytes in all", texts.len(), texts.iter().map(Vec::len).sum::<usize>());
-    // A seed of the search is a batch of sources: so the front end's thread is made once for many, and their memory is counted where it is used.
-    (arguments.first, arguments.count) = (0, count.div_ceil(BATCH));
-    let report = arguments.search(|batch, seen: &mut Seen| {
-        let seeds = first + batch * BATCH..first + ((batch + 1) * BATCH).min(count);
-        seen.merge(on_large_stack(|| look_at(&texts, seeds.clone())));
+    // Many at a time: so the front end's thread is made once for many, and their memory is counted where it is used.
+    let watch = measure::no_hang("sources", common::LATE_S);
+    let report = arguments.search_batches(BATCH, "sources", |seeds, seen: &mut Seen| {
+        seen.merge(on_large_stack(|| look_at(&texts, &watch, seeds.clone())));
         None
     });
     let seen = report.figures;
@@ -61,7 +60,7 @@ fn main() -> ExitCode {
         println!("source.st: {written:?}");
     }
     for finding in &report.findings {
-        println!("==== batch {}: {}", finding.seed, finding.description);
+        println!("==== sources from seed {} on: {}", finding.seed, finding.description);
     }
     for finding in &seen.findings {
         let path = format!("source-{}.st", finding.seed);
@@ -75,11 +74,11 @@ fn main() -> ExitCode {
     common::finish(findings)
 }
 
-fn look_at(texts: &[Vec<u8>], seeds: std::ops::Range<u64>) -> Seen {
+fn look_at(texts: &[Vec<u8>], watch: &Watch, seeds: std::ops::Range<u64>) -> Seen {
     let mut seen = Seen::default();
     for seed in seeds {
         let mutant = mutant(texts, seed);
-        let (result, cost) = measure::measure(|| checked::check(&mutant.bytes));
+        let (result, cost) = measure::measure(watch, seed, || checked::check(&mutant.bytes));
         seen.costs.count(seed, cost);
         let description = result.map(|codes| seen.checked.count(&mutant, &codes)).err().or_else(|| cost.finding());
         seen.findings.extend(description.map(|description| Finding { seed, description }));

@@ -13,7 +13,13 @@ use khz_proof::harness::meaning::{Plan, Tally, check_seed};
 const REDUCED: usize = 8;
 
 fn main() -> ExitCode {
-    let arguments = common::Arguments::read(1000, &["scans", "fuel", "passes", "tries"]);
+    let arguments = common::Arguments::read(
+        1000,
+        &common::Known {
+            options: &[("scans", 1..=10_000), ("fuel", common::ANY), ("passes", common::ANY), ("tries", common::ANY)],
+            ..common::Known::default()
+        },
+    );
     let usual = Plan::default();
     let plan = Plan {
         scans: arguments.option("scans", usual.scans),

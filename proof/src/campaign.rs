@@ -5,6 +5,7 @@
 //! while a seed is looked at is a finding like any other. No clock is read here: who wants to know how long it takes looks at his own.
 
 use std::collections::BTreeMap;
+use std::io;
 use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -19,6 +20,9 @@ const CHUNK: u64 = 32;
 
 /// Stack of a worker, in bytes: native code may need 6 MiB, and shrinkers and generators of trees recurse.
 const STACK_BYTES: usize = 32 << 20;
+
+/// Most threads of a search.
+pub const MOST_THREADS: usize = 1024;
 
 /// What a search counts. Figures of two ranges of seeds, put together, are the figures of both.
 pub trait Figures: Default + Send {
@@ -44,7 +48,7 @@ pub struct Campaign {
     pub first: u64,
     /// How many seeds follow each other from there.
     pub count: u64,
-    /// How many threads look (at least one does).
+    /// How many threads look at most (at least one does).
     pub threads: usize,
     /// The search ends with the chunk in which it has this many findings (at least one).
     pub most_findings: usize,
@@ -82,12 +86,16 @@ pub struct Report<F> {
 }
 
 impl Campaign {
-    /// Looks at every seed with `check`, which counts and says what it found, and tells `progress` after each chunk.
+    /// Looks at every seed with `check`, which counts and says what it found, and tells `progress` after each chunk. There are no more threads than
+    /// pieces of work, nor than [`MOST_THREADS`]; fewer when the machine has no more to spare.
+    ///
+    /// # Errors
+    /// When there is not even one.
     pub fn run<F: Figures>(
         &self,
         check: impl Fn(u64, &mut F) -> Option<String> + Sync,
         progress: impl FnMut(Progress) + Send,
-    ) -> Report<F> {
+    ) -> io::Result<Report<F>> {
         let next = AtomicU64::new(0);
         let report = Report { done: 0, findings: Vec::new(), figures: F::default() };
         let collector = Mutex::new(Collector {
@@ -107,12 +115,24 @@ impl Campaign {
             }
         };
         thread::scope(|scope| {
-            for _ in 0..self.threads.max(1) {
+            for number in 0..self.workers() {
                 let worker = thread::Builder::new().stack_size(STACK_BYTES);
-                worker.spawn_scoped(scope, carried(work)).expect("the machine has a thread to spare");
+                match worker.spawn_scoped(scope, carried(work)) {
+                    Ok(_) => {}
+                    Err(error) if number == 0 => return Err(error),
+                    // The answer does not depend on how many there are.
+                    Err(_) => break,
+                }
             }
-        });
-        collector.into_inner().unwrap_or_else(PoisonError::into_inner).report
+            Ok(())
+        })?;
+        Ok(collector.into_inner().unwrap_or_else(PoisonError::into_inner).report)
+    }
+
+    /// How many threads look: at least one, and none without a piece of work.
+    fn workers(&self) -> usize {
+        let chunks = usize::try_from(self.count.div_ceil(CHUNK)).unwrap_or(usize::MAX);
+        self.threads.min(chunks).clamp(1, MOST_THREADS)
     }
 
     /// Seeds of a chunk; none beyond the last.
@@ -202,7 +222,7 @@ mod tests {
             assert!(seed != 1100, "seed {seed} is not liked");
             seed.is_multiple_of(70).then(|| format!("{seed} is round"))
         };
-        Campaign { first: 1000, count: 1000, threads, most_findings }.run(check, progress)
+        Campaign { first: 1000, count: 1000, threads, most_findings }.run(check, progress).expect("a thread")
     }
 
     #[test]
@@ -224,6 +244,16 @@ mod tests {
     }
 
     #[test]
+    fn there_are_no_more_threads_than_work() {
+        let workers = |threads, count| Campaign { first: 0, count, threads, most_findings: 1 }.workers();
+        assert_eq!([workers(0, 1000), workers(7, 1000), workers(7, 65), workers(7, 0)], [1, 7, 3, 1]);
+        assert_eq!(workers(usize::MAX, u64::MAX), MOST_THREADS);
+        // As many as the machine gives, or else this is where it would end.
+        let report = search(usize::MAX, usize::MAX, |_| ());
+        assert_eq!(report.figures.0.0.len(), 1000);
+    }
+
+    #[test]
     fn a_search_ends_with_the_chunk_that_brings_enough() {
         for threads in [1, 3] {
             let report = search(threads, 3, |_| ());
@@ -237,13 +267,11 @@ mod tests {
     fn no_seeds_are_no_work_and_the_last_seed_is_the_end() {
         let run = |first, count| {
             let campaign = Campaign { first, count, threads: 2, most_findings: 1 };
-            campaign.run(
-                |seed, seen: &mut Seen| {
-                    seen.0.push(seed);
-                    None
-                },
-                |_| (),
-            )
+            let check = |seed, seen: &mut Seen| {
+                seen.0.push(seed);
+                None
+            };
+            campaign.run(check, |_| ()).expect("a thread")
         };
         assert_eq!((run(5, 0).done, run(5, 0).figures.0.len()), (0, 0));
         assert_eq!(run(u64::MAX - 2, 100).figures.0, [u64::MAX - 2, u64::MAX - 1]);

@@ -8,7 +8,8 @@
 //! container files to see whether the reader and the verifier let through anything that the engines then disagree about. [`st`] makes
 //! Structured Text together with its meaning, for the front end. [`schedule`] makes configurations
 //! of many tasks and foretells by a brute-force model what a scheduler must do with them. [`statistics`]
-//! counts what was reached, because a search that never went there proves nothing; [`campaign`] spreads many seeds over threads.
+//! counts what was reached, because a search that never went there proves nothing; [`campaign`] spreads many seeds over threads, [`watch`] names the
+//! one that does not end, [`arguments`] reads what a search is asked.
 //!
 //! All this knows engines only as [`khz_machine::engine::Engine`], made by makers that it is handed: a further engine, or one with a pass switched
 //! off, is one more maker. [`harness`] alone names the front end, the engines and the scheduler. Nothing here reads a clock or the environment: a seed is a program.
@@ -17,6 +18,7 @@
 #![forbid(unsafe_code)]
 #![allow(clippy::missing_panics_doc, reason = "a panic of this crate is a finding, never a matter of its callers")]
 
+pub mod arguments;
 pub mod bytecode;
 pub mod campaign;
 pub mod evaluator;
@@ -31,3 +33,4 @@ pub mod shrink;
 pub mod st;
 pub mod statistics;
 pub mod traces;
+pub mod watch;

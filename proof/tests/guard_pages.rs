@@ -21,7 +21,7 @@ const SEEDS: u64 = 150;
 fn programs_and_mutants_stay_inside_their_image() {
     let campaign = Campaign { first: 700_000, count: SEEDS, threads: 2, most_findings: 1 };
     let before = Guarded::blocks_ever();
-    let report = campaign.run(guarded_search::look, |_| ());
+    let report = campaign.run(guarded_search::look, |_| ()).expect("a thread");
     assert_eq!(report.findings, []);
     let Statistics { programs, runs, .. } = report.figures;
     assert!(programs * 10 >= SEEDS * 15, "{programs} programs: most seeds have a mutant that verifies");

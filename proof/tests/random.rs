@@ -25,7 +25,7 @@ fn random_programs_do_the_same_in_every_engine() {
         engines.note(statistics);
         found.map(|found| found.description)
     };
-    let Report { findings, figures: statistics, .. } = campaign.run(look, |_| ());
+    let Report { findings, figures: statistics, .. } = campaign.run(look, |_| ()).expect("a thread");
     assert_eq!(findings, []);
     let report = statistics.report();
     assert_eq!(statistics.executed.rare(500), Vec::<&str>::new(), "every instruction runs: {report}");

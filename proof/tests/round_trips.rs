@@ -24,7 +24,7 @@ fn all<T: Sync>(things: &[T], check: impl Fn(&T) -> Result<(), String> + Sync) -
 #[test]
 fn generated_texts_and_containers_survive() {
     let campaign = Campaign { first: 0, count: PROGRAMS, threads: 2, most_findings: 1 };
-    let report: Report<Tally> = campaign.run(check_seed, |_| ());
+    let report: Report<Tally> = campaign.run(check_seed, |_| ()).expect("a thread");
     assert!(report.findings.is_empty(), "{}", report.findings[0].description);
     let tally = report.figures;
     assert_eq!((tally.texts, tally.containers), (PROGRAMS, 2 * PROGRAMS));

@@ -17,7 +17,7 @@ fn tasks_run_when_and_as_often_as_the_rules_say() {
         let used = if seed.is_multiple_of(IN_BOTH) { &makers[..] } else { &makers[..1] };
         check_seed(seed, used, tally, 400)
     };
-    let report = campaign.run(check, |_| ());
+    let report = campaign.run(check, |_| ()).expect("a thread");
     if let Some(found) = report.findings.first() {
         panic!("{}", found.description);
     }

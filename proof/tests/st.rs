@@ -15,7 +15,7 @@ fn generated_programs_mean_what_their_trees_mean() {
     let campaign = Campaign { first: 0, count: PROGRAMS, threads: 2, most_findings: 1 };
     let plan = |seed: u64| Plan { scans: if seed.is_multiple_of(4) { 10 } else { 4 }, fuel: 16, passes: 0 };
     let report: Report<Tally> =
-        campaign.run(|seed, tally: &mut Tally| check_seed(seed, plan(seed), tally, 300), |_| ());
+        campaign.run(|seed, tally: &mut Tally| check_seed(seed, plan(seed), tally, 300), |_| ()).expect("a thread");
     assert!(report.findings.is_empty(), "a program differs:\n{}", report.findings[0].description);
     let tally = report.figures;
     assert_eq!((tally.programs, tally.refused), (PROGRAMS, 0), "every program is compared, none is refused");

@@ -30,8 +30,10 @@ pub struct Tally {
     pub traps: u64,
     /// Programs whose initialisation traps.
     pub ended: u64,
-    /// What went wrong.
-    pub wrong: Vec<String>,
+    /// Programs on which the sides differ.
+    pub differences: Vec<String>,
+    /// Files that can not be read, or are refused and do not say so.
+    pub refusals: Vec<String>,
 }
 
 impl Tally {
@@ -44,7 +46,8 @@ impl Tally {
         self.cycles += other.cycles;
         self.traps += other.traps;
         self.ended += other.ended;
-        self.wrong.extend(other.wrong);
+        self.differences.extend(other.differences);
+        self.refusals.extend(other.refusals);
     }
 }
 
@@ -86,7 +89,7 @@ fn run_file(path: &Path, rounds: u64, seed: u64) -> Tally {
     let bytes = match std::fs::read(path) {
         Ok(bytes) => bytes,
         Err(error) => {
-            tally.wrong.push(format!("{name}: {error}"));
+            tally.refusals.push(format!("{name}: {error}"));
             return tally;
         }
     };
@@ -99,7 +102,7 @@ fn run_file(path: &Path, rounds: u64, seed: u64) -> Tally {
         Err(Refused::Diagnostics { .. }) if says("error:") || says("not yet") || !text.contains("PROGRAM") => {
             tally.refused += 1;
         }
-        Err(error) => tally.wrong.push(format!("{name}: {error}")),
+        Err(error) => tally.refusals.push(format!("{name}: {error}")),
         Ok(loaded) if loaded.programs.is_empty() => tally.without_program += 1,
         Ok(loaded) => loaded.programs.iter().for_each(|program| run_program(&name, program, rounds, seed, &mut tally)),
     }
@@ -117,7 +120,7 @@ fn run_program(name: &str, program: &Program, rounds: u64, seed: u64, tally: &mu
             tally.traps += summary.traps.values().sum::<u64>();
             tally.ended += u64::from(summary.ended.is_some());
         }
-        Err(reason) => tally.wrong.push(format!("{name}, RESOURCE {}: {reason}", program.name)),
+        Err(reason) => tally.differences.push(format!("{name}, RESOURCE {}: {reason}", program.name)),
     }
 }
 

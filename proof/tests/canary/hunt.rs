@@ -13,13 +13,13 @@ pub fn hunt<F: Figures>(fault: Fault, programs: u64, look: impl Fn(u64, &mut F) 
     let start = Instant::now();
     let found: Report<F> = {
         let _planted = plant(fault);
-        campaign.run(&look, |_| ())
+        campaign.run(&look, |_| ()).expect("a thread")
     };
     let elapsed_s = start.elapsed().as_secs_f64();
     let finding = found.findings.into_iter().next();
     let finding = finding.unwrap_or_else(|| panic!("not found in {programs} programs: {}", fault.text()));
     show(&format!("{fault:?}: seed {} of a search of {elapsed_s:.1} s. {}", finding.seed, fault.text()));
-    let sound: Report<F> = Campaign { count: finding.seed + 1, ..campaign }.run(look, |_| ());
+    let sound: Report<F> = Campaign { count: finding.seed + 1, ..campaign }.run(look, |_| ()).expect("a thread");
     assert_eq!(sound.findings, [], "without the fault");
     finding
 }

@@ -1,8 +1,13 @@
-//! What one item of a search costs: time, and the most memory that was held at a time, by a counting allocator.
+//! What one item of a search costs: time, and the most memory that was held at a time, by a counting allocator. An item without an end
+//! ends the process, by its name.
 #![allow(dead_code, reason = "each user takes its part")]
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
+use std::io::Write;
+use std::time::Duration;
+
+use khz_proof::watch::Watch;
 
 thread_local! {
     /// Bytes that this thread has asked for and not given back; below 0 when it frees what another asked for.
@@ -77,13 +82,22 @@ impl Cost {
     }
 }
 
-/// Does something on this thread and says what it cost. Work handed to other threads is not counted.
+/// A watch that ends the process with status 101 when an item of `what` runs for some seconds: it would stand still otherwise.
+pub fn no_hang(what: &'static str, seconds: u64) -> Watch {
+    Watch::new(seconds, Duration::from_secs(1), move |seed| {
+        // Past whatever captures the output of a test. When nobody reads it, the status says it still.
+        let _ = writeln!(std::io::stderr(), "{what}: seed {seed} has run for {seconds} s");
+        std::process::exit(101);
+    })
+}
+
+/// Does the item of a seed on this thread and says what it cost. Work handed to other threads is not counted.
 #[allow(clippy::disallowed_methods, reason = "the cost of hostile input is what is looked for")]
-pub fn measure<T>(work: impl FnOnce() -> T) -> (T, Cost) {
+pub fn measure<T>(watch: &Watch, seed: u64, work: impl FnOnce() -> T) -> (T, Cost) {
     let before = HELD.get();
     MOST.set(before);
     let start = std::time::Instant::now();
-    let result = work();
+    let result = watch.over(seed, work);
     let time_ns = u64::try_from(start.elapsed().as_nanos()).unwrap_or(u64::MAX);
     (result, Cost { time_ns, bytes: u64::try_from(MOST.get() - before).unwrap_or(0) })
 }

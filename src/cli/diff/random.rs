@@ -66,7 +66,9 @@ pub fn run(args: &DiffArgs, count: u64) -> Outcome {
     let programs = Programs { first, count };
     let threads = args.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
     let campaign = Campaign { first, count: count.div_ceil(2), threads, most_findings: 1 };
-    let report = campaign.run(|seed, reached: &mut Reached| check(args, programs, seed, reached), show);
+    let report = campaign
+        .run(|seed, reached: &mut Reached| check(args, programs, seed, reached), show)
+        .map_err(|error| no_thread(&error))?;
     if std::io::stderr().is_terminal() {
         // The line is people's only; a closed terminal does not matter.
         let _ = write!(std::io::stderr(), "\r\x1b[K");
@@ -76,7 +78,8 @@ pub fn run(args: &DiffArgs, count: u64) -> Outcome {
         // On a thread like those of the search: shrinkers recurse.
         let alone = Campaign { first: found.seed, count: 1, threads: 1, most_findings: 1 };
         let small = alone.run(|seed, (): &mut ()| smallest(args, programs, seed), |_| ());
-        small.findings.into_iter().next().map_or_else(|| found.description.clone(), |small| small.description)
+        let findings = small.map(|small| small.findings).unwrap_or_default();
+        findings.into_iter().next().map_or_else(|| found.description.clone(), |small| small.description)
     });
     let Reached { text, with_inputs, containers } = &report.figures;
     let statistics = format!(
@@ -104,6 +107,11 @@ pub fn run(args: &DiffArgs, count: u64) -> Outcome {
         }
     }
     Ok(if found.is_some() { Status::Differ } else { Status::Done })
+}
+
+/// The machine has no thread for the search.
+fn no_thread(error: &std::io::Error) -> Failure {
+    Failure::Message(Status::Host, format!("no thread can be had: {error}"))
 }
 
 /// How far it is, on a terminal.
