@@ -481,6 +481,9 @@ impl<'a> Checker<'_, 'a> {
     fn block_call(&mut self, instance: Place, ty: TyId, pou: PouId, args: &'a [Arg], span: Span) -> Option<Call> {
         let info = self.an.resolve_pou(pou)?;
         self.note_callee(pou, span);
+        if let (Root::Var(var), true, Some(unit)) = (instance.root, instance.path.is_empty(), self.pou) {
+            self.usage.called_blocks.entry((unit, var)).or_insert(span);
+        }
         let Some(bound) = self.bind(&info, args) else {
             self.check_loose(args);
             return None;

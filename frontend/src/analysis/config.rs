@@ -103,6 +103,7 @@ impl<'a> Analyzer<'a> {
                 copy_in: Vec::new(),
                 inouts: Vec::new(),
                 copy_out: Vec::new(),
+                blocks: Vec::new(),
                 values: Vec::new(),
                 image_values: Vec::new(),
                 span: pou.name.span,
@@ -228,12 +229,16 @@ impl<'a> Analyzer<'a> {
             copy_in: Vec::new(),
             inouts: Vec::new(),
             copy_out: Vec::new(),
+            blocks: Vec::new(),
             values: Vec::new(),
             image_values: Vec::new(),
             span: program.name.span,
         };
         let mut connected: Vec<VarId> = Vec::new();
         for connection in &program.connections {
+            if let Connection::FbTask { fb, task } = connection {
+                self.block_task(fb, task, tasks, &mut instance);
+            }
             self.connection(connection, pou, environment, plan, &mut instance, &mut connected);
         }
         self.refuse_unconnected(pou, &connected, program.name.span);
@@ -241,7 +246,7 @@ impl<'a> Analyzer<'a> {
         Some(instance)
     }
 
-    fn known_task(&mut self, name: &Ident, tasks: &BTreeMap<Symbol, (u32, Span)>) -> Option<u32> {
+    pub(super) fn known_task(&mut self, name: &Ident, tasks: &BTreeMap<Symbol, (u32, Span)>) -> Option<u32> {
         let found = tasks.get(&name.symbol).map(|(at, _)| *at);
         if found.is_none() {
             let message = format!("this resource has no task `{}`", self.spelling(name));
@@ -285,14 +290,7 @@ impl<'a> Analyzer<'a> {
         let (variable, other, is_source) = match connection {
             Connection::Source { variable, source } => (variable, source, true),
             Connection::Sink { variable, sink } => (variable, sink, false),
-            Connection::FbTask { fb, .. } => {
-                self.report(
-                    &rules::NOT_SUPPORTED,
-                    fb.span,
-                    "function block instances on tasks of their own are not of the language yet",
-                );
-                return;
-            }
+            Connection::FbTask { .. } => return,
         };
         let Some(info) = self.info(pou) else { return };
         let AstKind::Name(name) = &variable.kind else {
@@ -383,6 +381,9 @@ impl Usage {
         }
         self.image_parameters.extend(other.image_parameters);
         self.parameter_edges.extend(other.parameter_edges);
+        for (instance, span) in other.called_blocks {
+            self.called_blocks.entry(instance).or_insert(span);
+        }
         for (variable, weight) in other.heat {
             *self.heat.entry(variable).or_default() += weight;
         }

@@ -274,11 +274,16 @@ impl<'a> Analyzer<'a> {
         let bytes = self.types.extent(target.place.ty).0;
         let image =
             Place { root: Root::Direct(located), path: Vec::new(), ty: target.place.ty, span: target.place.span };
+        // What a task of its own runs is copied around that.
+        let (copy_in, copy_out) = match instance.blocks.iter_mut().find(|block| block.var == root) {
+            Some(block) => (&mut block.copy_in, &mut block.copy_out),
+            None => (&mut instance.copy_in, &mut instance.copy_out),
+        };
         if located.place != BytePlace::Input {
             instance.image_values.push((located, target.place.ty, initial));
-            instance.copy_out.push(assign(image.clone(), target.place.clone()));
+            copy_out.push(assign(image.clone(), target.place.clone()));
         }
-        instance.copy_in.push(assign(target.place, image));
+        copy_in.push(assign(target.place, image));
         let environment = super::expr::Environment::new();
         let mut checker = Checker::body(self, None, &environment);
         checker.note_image(located, bytes);

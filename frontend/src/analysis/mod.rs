@@ -13,6 +13,7 @@ pub mod types;
 mod union;
 
 mod bcd;
+mod block_tasks;
 mod call;
 mod config;
 mod configured;

@@ -18,6 +18,8 @@ impl<'a> Analyzer<'a> {
         let mut plans = Vec::with_capacity(planned.len());
         for Planned { mut plan, environment } in planned {
             let mut waiting: Vec<PouId> = plan.instances.iter().map(|instance| instance.program).collect();
+            let blocks = plan.instances.iter().flat_map(|instance| &instance.blocks);
+            waiting.extend(blocks.map(|block| block.block));
             waiting.extend(plan.startup);
             let mut bodies: BTreeMap<PouId, Body> = BTreeMap::new();
             let mut seen: BTreeSet<PouId> = waiting.iter().copied().collect();
@@ -37,6 +39,7 @@ impl<'a> Analyzer<'a> {
                 bodies.insert(pou, body);
             }
             plan.bodies = bodies.into_iter().collect();
+            self.refuse_calls_of_block_tasks(&plan);
             plans.push(plan);
         }
         self.check_rest(&checked, &mut calls);

@@ -213,6 +213,8 @@ pub struct Usage {
     pub image_bytes: [u32; 3],
     /// Reference parameters that get a place in %I, %Q or %M.
     pub image_parameters: std::collections::BTreeSet<(PouId, VarId)>,
+    /// Function block instances that are variables of a unit and that its body calls, and where.
+    pub called_blocks: std::collections::BTreeMap<(PouId, VarId), Span>,
     /// Reference parameters (first) that get what another one (second) is.
     pub parameter_edges: std::collections::BTreeSet<((PouId, VarId), (PouId, VarId))>,
     /// How hot a variable is: uses, ten times as much in each loop.
@@ -270,11 +272,32 @@ pub struct InstancePlan {
     pub inouts: Vec<(VarId, Place)>,
     /// Statements after its body.
     pub copy_out: Vec<Stmt>,
+    /// Its function block instances that tasks of their own run.
+    pub blocks: Vec<BlockTask>,
     /// Initial values that VAR_CONFIG gives to its variables in place of the declared ones.
     pub values: Vec<(VarId, Value)>,
     /// Initial values of places of the process image that VAR_CONFIG gives to its variables.
     pub image_values: Vec<(Located, Ty, Value)>,
     /// Where it is declared.
+    pub span: Span,
+}
+
+/// `fb WITH task`: a function block instance of a program instance that a task runs.
+#[derive(Debug)]
+pub struct BlockTask {
+    /// The instance's name with that of its program instance.
+    pub name: String,
+    /// The variable.
+    pub var: VarId,
+    /// The function block.
+    pub block: PouId,
+    /// Position of its task in [`ResourcePlan::tasks`].
+    pub task: u32,
+    /// Statements before its body.
+    pub copy_in: Vec<Stmt>,
+    /// Statements after its body.
+    pub copy_out: Vec<Stmt>,
+    /// Where it is written.
     pub span: Span,
 }
 

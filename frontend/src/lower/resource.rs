@@ -24,6 +24,11 @@ struct Base {
     data: u32,
 }
 
+/// The names of a program instance and of its function block instances that tasks run.
+fn entry_names(instance: &InstancePlan) -> impl Iterator<Item = String> + '_ {
+    std::iter::once(instance.name.clone()).chain(instance.blocks.iter().map(|block| block.name.clone()))
+}
+
 impl Builder<'_> {
     /// Puts everything together.
     pub(super) fn finish(&mut self, sources: &SourceMap, hashes: &Hashes) -> Container {
@@ -36,9 +41,22 @@ impl Builder<'_> {
             let connected =
                 !instance.copy_in.is_empty() || !instance.copy_out.is_empty() || !instance.inouts.is_empty();
             let entry = if connected { self.lower_entry(instance, &info) } else { self.function_id(instance.program) };
-            let (base, row) = self.place_instance(at, instance, entry);
+            let (base, mut row) = self.place_instance(at, instance, entry);
+            row.id = InstanceId(self.id16(instances.len(), "program instances"));
             bases.push(base);
             instances.push(row);
+            for block in &instance.blocks {
+                let entry = self.lower_block_entry(instance, &info, block, base.data);
+                instances.push(ProgramInstance {
+                    id: InstanceId(self.id16(instances.len(), "program instances")),
+                    task: TaskId(self.id16(block.task as usize, "tasks")),
+                    entry,
+                    slot_offset: self.id16(self.section.slots.len(), "slots"),
+                    slot_count: 0,
+                    block_offset: self.id16(self.section.block_instances.len(), "function block instances"),
+                    block_count: 0,
+                });
+            }
         }
         self.global_blocks();
         let startup_function = plan.startup.and_then(|pou| self.info(pou).map(|info| self.lower_startup(pou, &info)));
@@ -406,7 +424,7 @@ impl Builder<'_> {
             function_names: self.function_names.clone(),
             types: types.list,
             variables,
-            instance_names: plan.instances.iter().map(|instance| instance.name.clone()).collect(),
+            instance_names: plan.instances.iter().flat_map(entry_names).collect(),
             resource_name: plan.name.clone(),
             configuration_name: plan.configuration.clone(),
         }

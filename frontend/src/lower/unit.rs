@@ -1,7 +1,7 @@
 //! One function for each program organisation unit.
 
-use khz_bytecode::container::{Function, Owner};
-use khz_bytecode::ids::FunctionId;
+use khz_bytecode::container::{Function, Owner, ProgramType};
+use khz_bytecode::ids::{FunctionId, ProgramId};
 use khz_bytecode::instruction::Instruction as I;
 use khz_bytecode::value::{BytePlace, LocalType, RefType, SlotPlace, Storage};
 
@@ -10,7 +10,7 @@ use super::call::result_vars;
 use super::open::has_open;
 use super::place::Home;
 use super::{Builder, FunctionCost};
-use crate::analysis::tree::{InstancePlan, PouId, PouInfo, VarClass, VarId, VarInfo};
+use crate::analysis::tree::{BlockTask, InstancePlan, PouId, PouInfo, VarClass, VarId, VarInfo};
 use crate::analysis::types::{Const, Ty, Value};
 use crate::source::Span;
 use crate::syntax::ast::PouKind;
@@ -95,6 +95,43 @@ impl<'p> Builder<'p> {
         f.statements(&instance.copy_out);
         let (function, marks, cost) = f.finish(owner, |_| {});
         self.add_function(instance.name.clone(), function, marks, cost)
+    }
+
+    /// The entry of a function block instance that a task runs. It belongs to a program without variables, and reaches the instance where it lies
+    /// in the data region: `data` is where the variables of its program instance begin.
+    pub(super) fn lower_block_entry(
+        &mut self,
+        instance: &InstancePlan,
+        info: &PouInfo,
+        block: &BlockTask,
+        data: u32,
+    ) -> FunctionId {
+        let place = self.unit_homes.get(&instance.program).and_then(|homes| homes.get(block.var.0 as usize)).copied();
+        let offset = match place {
+            Some(Home::Bytes(BytePlace::Block, offset)) => data.saturating_add(offset),
+            _ => data,
+        };
+        let empty = ProgramType::default();
+        let known = self.section.programs.iter().position(|program| *program == empty);
+        let owner = known.unwrap_or_else(|| {
+            self.section.programs.push(empty);
+            self.section.programs.len() - 1
+        });
+        let owner = Owner::Program(ProgramId(self.id16(owner, "program types")));
+        let function = self.function_id(block.block);
+        let mut f = FunctionBuilder::new(self, Some(instance.program));
+        f.homes = vec![Home::None; info.vars.len()];
+        f.set_home(block.var, Home::Bytes(BytePlace::Data, offset));
+        f.e.mark(block.span);
+        f.statements(&block.copy_in);
+        if let Some(var) = info.vars.get(block.var.0 as usize) {
+            f.push_address(BytePlace::Data, offset, var.ty);
+        }
+        f.e.mark(block.span);
+        f.e.push(I::Call { function }, 1, 0);
+        f.statements(&block.copy_out);
+        let (function, marks, cost) = f.finish(owner, |_| {});
+        self.add_function(block.name.clone(), function, marks, cost)
     }
 
     /// A function that calls another and drops its results.

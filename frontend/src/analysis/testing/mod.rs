@@ -91,6 +91,7 @@ impl<'a> Analyzer<'a> {
                 copy_in: Vec::new(),
                 inouts: Vec::new(),
                 copy_out: Vec::new(),
+                blocks: Vec::new(),
                 values: Vec::new(),
                 image_values: Vec::new(),
                 span: unit.span,
