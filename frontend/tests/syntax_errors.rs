@@ -181,7 +181,7 @@ fn things_that_are_no_statements() {
         [
             "2:1 P0022 this has a value and does nothing with it",
             "3:1 P0022 this has a value and does nothing with it",
-            "4:2 P0004 expected `:=` or `(` after the beginning of this statement, found `+`",
+            "4:1 P0022 this computes a value and does nothing with it",
             "5:1 P0004 expected a statement, found `5`",
             "6:1 P0004 expected a statement, found `)`",
         ]

@@ -52,13 +52,13 @@ fn assertions_compare_what_meets_in_one_type() {
          ASSERT_NEAR(s, 'x', 1);\nASSERT_EQ(n, nobody);",
         &expect![[r#"
             t.st:2:1 S0060 ASSERT_EQ can not compare INT and TIME
-            t.st:3:13 T0004 a condition is a BOOL, not INT
+            t.st:3:13 T0004 a condition is a BOOL, not INT (compare it: `value <> 0`)
             t.st:4:1 S0060 ASSERT_GT can not compare ARRAY[0..2000] OF INT and ARRAY[0..2000] OF INT
             t.st:5:1 S0060 an assertion compares at most 1024 values; compare parts
             t.st:6:1 S0060 ASSERT_EQ can not compare Pump and Pump
             t.st:7:1 S0060 ASSERT_EQ can not compare ARRAY[1..2] OF Pump and ARRAY[1..2] OF Pump
             t.st:8:1 S0060 ASSERT_NEAR can not compare STRING[80] and STRING[1]
-            t.st:9:14 S0001 `nobody` is not declared
+            t.st:9:14 S0001 `nobody` is not declared (declare it in a VAR section, or correct its name)
         "#]],
     );
 }
@@ -83,12 +83,12 @@ fn only_instances_and_functions_of_the_sources_are_mocked() {
          MOCK_FUNCTION Half RETURNS 'x';\nMOCK_FUNCTION Half;\nMOCK_VERIFY_CALLED(n);\nMOCK_VERIFY_CALL_COUNT(p);\nMOCK q[1];",
         &expect![[r#"
             t.st:2:6 S0061 INT has no body to replace: an instance of a function block is mocked
-            t.st:3:6 S0001 `nobody` is not declared
+            t.st:3:6 S0001 `nobody` is not declared (declare it in a VAR section, or correct its name)
             t.st:4:15 S0061 there is no FUNCTION `Halv` in these files (did you mean `Half`?)
             t.st:5:15 S0061 `Act` has no result that could be replaced
             t.st:6:15 S0061 there is no FUNCTION `SIN` in these files
-            t.st:7:28 T0001 INT is wanted here, not STRING[1]
-            t.st:8:19 P0004 expected `RETURNS` and a value after the function, found `;`
+            t.st:7:28 T0001 INT is wanted here, not STRING[1] (read the number in it with `STRING_TO_INT(…)` or the like)
+            t.st:8:19 P0004 expected `RETURNS` and a value after the function, found `;` (write `RETURNS` and a value there)
             t.st:9:20 S0061 INT has no body to replace: an instance of a function block is mocked
             t.st:10:1 S0060 MOCK_VERIFY_CALL_COUNT takes INSTANCE, COUNT
         "#]],
@@ -115,8 +115,8 @@ fn a_file_has_one_fixture_and_tests_have_names_of_their_own() {
         t.st:2:6 P0031 there are two tests `a` in this file
         t.st:3:6 P0031 a test has a name (say in it what holds: `TEST 'the motor stops at its limit'`)
         t.st:5:1 P0031 a file has one SETUP
-        t.st:8:1 P0017 expected `END_IF`, found `END_TEST`
-        t.st:9:15 P0004 expected `END_TEST_PROGRAM` after the TEST_PROGRAM, found `END_PROGRAM`
+        t.st:8:1 P0017 expected `END_IF`, found `END_TEST` (write `END_IF` there)
+        t.st:9:15 P0004 expected `END_TEST_PROGRAM` after the TEST_PROGRAM, found `END_PROGRAM` (write `END_TEST_PROGRAM` there)
     "#]]
     .assert_eq(&messages(text));
 }

@@ -10,7 +10,7 @@ use super::tree::{
     Call, Expr, ExprKind, Place, PouId, PouInfo, Root, Step, Stmt, StmtKind, UnOp, VarClass, VarId, VarInfo,
 };
 use super::types::{BOOL, Const, Ty, TyId, Value};
-use crate::diagnostics::{semantic as names, types as rules};
+use crate::diagnostics::{Diagnostic, semantic as names, types as rules};
 use crate::source::Span;
 use crate::syntax::ast::{self, Arg, ArgKind, Ident, PouKind};
 use crate::syntax::symbol::Symbol;
@@ -82,7 +82,9 @@ impl<'a> Checker<'_, 'a> {
                     let what = if kind == Some(PouKind::Program) { "a program" } else { "a type" };
                     let message =
                         format!("`{}` is {what}, not a function; only instances of it run", self.an.spelling(name));
-                    self.an.report(&names::NOT_CALLABLE, name.span, message);
+                    let spelling = self.an.spelling(name);
+                    let help = format!("declare an instance of it, `my{spelling} : {spelling};`, and call that");
+                    self.an.push(Diagnostic::new(&names::NOT_CALLABLE, name.span, message).help(help));
                     Callee::Broken
                 }
             },
@@ -100,7 +102,8 @@ impl<'a> Checker<'_, 'a> {
             Callee::Standard(name) => self.standard_call(&name, args, span, want),
             Callee::Block(..) => {
                 let message = "a function block has no value; call it in a statement, then read its outputs";
-                self.an.report(&names::NOT_CALLABLE, span, message);
+                let found = Diagnostic::new(&names::NOT_CALLABLE, span, message);
+                self.an.push(found.help("the call is a statement, its outputs are fields of the instance: `timer.Q`"));
                 broken(span)
             }
             Callee::Function(pou) => {
@@ -253,13 +256,15 @@ impl<'a> Checker<'_, 'a> {
                 return false;
             }
             (Some((_, var)), Some(_), _) if var.class != VarClass::Output => {
-                let message = format!("`{}` is no output; write `:=`", var.name);
-                self.an.report(&names::UNKNOWN_PARAMETER, name.span, message);
+                let message = format!("`{}` is no output", var.name);
+                let found = Diagnostic::new(&names::UNKNOWN_PARAMETER, name.span, message);
+                self.an.push(found.help(format!("inputs are given with `{} := …`", var.name)));
                 return false;
             }
             (Some((_, var)), None, _) if var.class == VarClass::Output => {
-                let message = format!("`{}` is an output; write `=>`", var.name);
-                self.an.report(&names::UNKNOWN_PARAMETER, name.span, message);
+                let message = format!("`{}` is an output", var.name);
+                let found = Diagnostic::new(&names::UNKNOWN_PARAMETER, name.span, message);
+                self.an.push(found.help(format!("outputs are taken with `{} => …`", var.name)));
                 return false;
             }
             (Some((id, _)), Some(negated), Some(value)) => bound.outputs.push((*id, value, negated)),

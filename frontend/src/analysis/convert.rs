@@ -120,6 +120,21 @@ pub(super) fn common(a: E, b: E) -> Option<(E, Option<&'static Rule>)> {
     if integer(a) && integer(b) { common_integer(a, b) } else { None }
 }
 
+/// What to write where a value has the wrong type, and no conversion between elementary types says it.
+fn mismatch_hint(from: Ty, to: Ty, target: Option<E>) -> Option<&'static str> {
+    Some(match (from, to) {
+        (Ty::IntLit | Ty::RealLit, _) if target.is_some_and(super::types::is_duration) => {
+            "durations are written `T#5s`"
+        }
+        (Ty::IntLit | Ty::RealLit, _) if target == Some(E::Bool) => "a BOOL is TRUE or FALSE",
+        (Ty::RealLit, _) if target.is_some() => "round it with `REAL_TO_INT(…)`, or declare the variable as REAL",
+        (Ty::Str(_), _) if target.is_some() => "read the number in it with `STRING_TO_INT(…)` or the like",
+        (Ty::IntLit | Ty::RealLit, Ty::Str(_)) => "strings stand in `'`: `'5'`",
+        (_, Ty::Str(_)) => "make a text of it with `INT_TO_STRING(…)` or the like",
+        _ => return None,
+    })
+}
+
 impl Checker<'_, '_> {
     /// An expression of exactly the type `to`, converted if that happens by itself; else reports.
     pub(super) fn coerce(&mut self, expr: Expr, to: Ty) -> Expr {
@@ -178,6 +193,9 @@ impl Checker<'_, '_> {
         let both = (self.an.types.elementary(expr.ty), self.an.types.elementary(to));
         if let (Some(from), Some(to), Ty::Elem(_)) = (both.0, both.1, to) {
             found = found.help(format!("convert it: {}_TO_{}(…)", from.name(), to.name()));
+        }
+        if found.help.is_none() {
+            found.help = mismatch_hint(expr.ty, to, both.1).map(str::to_owned);
         }
         self.an.push(found);
     }

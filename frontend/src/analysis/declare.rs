@@ -85,7 +85,7 @@ impl<'a> Analyzer<'a> {
         if let Some(first) = first {
             found = found.label(first, "first here");
         }
-        self.push(found);
+        self.push(found.help("give one of them another name"));
     }
 
     fn declare_type(&mut self, name: &Ident, source: TypeSource<'a>) -> bool {
@@ -235,7 +235,9 @@ impl<'a> Analyzer<'a> {
             State::Busy => {
                 let name = decl.names.first().map_or("", |name| self.spelling(name));
                 let message = format!("the value of `{name}` depends on itself");
-                self.report(&rules::RECURSIVE_CONSTANT, span, message);
+                let declared = decl.names.first().map_or(decl.span, |name| name.span);
+                let found = Diagnostic::new(&rules::RECURSIVE_CONSTANT, span, message).label(declared, "declared here");
+                self.push(found.help("give it a value that does not need it"));
                 return Some((Ty::Error, Value::Zero));
             }
             State::Waiting => entry.state = State::Busy,

@@ -10,7 +10,7 @@ use super::testing::TestBody;
 use super::tree::{BinOp, Expr, ExprKind, GlobalId, PouId, PouInfo, Root, Stmt, UnOp, Usage};
 use super::types::{BOOL, Const, Ty, TyKind, Value, is_bits, is_duration, is_integer, is_real, is_signed, is_unsigned};
 use super::{Analyzer, ConstKey, TypeSource};
-use crate::diagnostics::{semantic as names, types as rules};
+use crate::diagnostics::{Diagnostic, semantic as names, types as rules};
 use crate::source::Span;
 use crate::syntax::ast::{self, Ident, LiteralValue, TypeSpecKind};
 use crate::syntax::symbol::Symbol;
@@ -109,7 +109,7 @@ impl<'c, 'a> Checker<'c, 'a> {
             return found;
         }
         let message = format!("a condition is a BOOL, not {}", self.an.types.name(found.ty));
-        self.an.report(&rules::CONDITION, expr.span, message);
+        self.an.push(Diagnostic::new(&rules::CONDITION, expr.span, message).help("compare it: `value <> 0`"));
         broken(expr.span)
     }
 
@@ -503,7 +503,18 @@ impl<'c, 'a> Checker<'c, 'a> {
 
     fn no_operator(&mut self, op: BinOp, a: Ty, b: Ty, span: Span) -> Expr {
         let (x, y) = (self.an.types.name(a), self.an.types.name(b));
-        self.an.report(&rules::OPERATOR, span, format!("{} is not defined for {x} and {y}", op.text()));
+        let mut found =
+            Diagnostic::new(&rules::OPERATOR, span, format!("{} is not defined for {x} and {y}", op.text()));
+        let text = |ty| matches!(ty, Ty::Str(_));
+        found.help = match op {
+            BinOp::Add if text(a) && text(b) => Some("join strings with `CONCAT(a, b)`"),
+            _ if text(a) != text(b) => Some("convert one of them, with `INT_TO_STRING` or `STRING_TO_INT` for example"),
+            _ if op.is_comparison() && (a == BOOL) != (b == BOOL) => Some("compare two by two: `a < b AND b < c`"),
+            _ if (a == BOOL) != (b == BOOL) => Some("convert the BOOL: `BOOL_TO_INT(…)`"),
+            _ => None,
+        }
+        .map(str::to_owned);
+        self.an.push(found);
         broken(span)
     }
 

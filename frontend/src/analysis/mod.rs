@@ -286,9 +286,19 @@ impl<'a> Analyzer<'a> {
         let known = known.filter(|symbol| *symbol != ident.symbol).map(|symbol| (self.text(symbol), symbol));
         let best = nearest(wanted, known);
         let mut found = Diagnostic::new(rule, ident.span, message);
-        if let Some(symbol) = best {
-            found = found.help(format!("did you mean `{}`?", self.ast.names.text_as_written(symbol)));
-        }
+        let default = match rule.code {
+            "S0001" if wanted == "DEFAULT" => Some("what no label names stands behind `ELSE`".to_owned()),
+            "S0001" if wanted == "PRINT" => {
+                Some("nothing is printed: look at variables with `khz run --watch`".to_owned())
+            }
+            "S0001" => Some("declare it in a VAR section, or correct its name".to_owned()),
+            "S0003" => Some("declare it with `TYPE … END_TYPE`, or correct its name".to_owned()),
+            _ => None,
+        };
+        found.help = match best {
+            Some(symbol) => Some(format!("did you mean `{}`?", self.ast.names.text_as_written(symbol))),
+            None => default,
+        };
         self.push(found);
     }
 }

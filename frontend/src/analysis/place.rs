@@ -119,7 +119,14 @@ impl<'a> Checker<'_, 'a> {
             }
             ast::ExprKind::Error => None,
             _ => {
-                self.an.report(&names::NOT_A_VARIABLE, span, "a variable is wanted here");
+                let found = Diagnostic::new(&names::NOT_A_VARIABLE, span, "a variable is wanted here");
+                let help = match &expr.kind {
+                    ast::ExprKind::Call { .. } => {
+                        "elements of arrays are written `a[1]`; the result of a call is no variable"
+                    }
+                    _ => "name a variable, an element or a field",
+                };
+                self.an.push(found.help(help));
                 None
             }
         }
@@ -330,7 +337,8 @@ impl<'a> Checker<'_, 'a> {
         if let Some(value) = known.filter(|_| found.ty != BOOL) {
             if value < i128::from(low) || value > i128::from(high) {
                 let message = format!("index {value} is outside {low}..{high}");
-                self.an.report(&rules::INDEX, index.span, message);
+                let found = Diagnostic::new(&rules::INDEX, index.span, message);
+                self.an.push(found.help(format!("the first index is {low}, the last one {high}")));
                 return None;
             }
             let value = Const::Int(i64::try_from(value).unwrap_or(0));
@@ -419,7 +427,8 @@ impl<'a> Checker<'_, 'a> {
         let Some((message, declared)) = refusal else { return true };
         let mut found = Diagnostic::new(&names::NOT_WRITABLE, place.span, message);
         if let Some(declared) = declared {
-            found = found.label(declared, "declared here");
+            found =
+                found.label(declared, "declared here").help("leave CONSTANT out there, or assign to another variable");
         }
         self.an.push(found);
         false

@@ -131,7 +131,12 @@ impl<'a> Analyzer<'a> {
                 if on_way.contains(&callee) {
                     let name = self.info(callee).map(|info| info.name.clone()).unwrap_or_default();
                     let message = format!("this call leads back to `{name}`, which is still running then");
-                    self.report(&rules::RECURSIVE_CALL, span, message);
+                    let first = self.info(callee).map(|info| info.span);
+                    let mut found = Diagnostic::new(&rules::RECURSIVE_CALL, span, message);
+                    if let Some(first) = first {
+                        found = found.label(first, "declared here");
+                    }
+                    self.push(found.help("write a loop instead: calls never lead back"));
                 } else if !done.contains(&callee) {
                     on_way.insert(callee);
                     way.push((callee, next(callee)));

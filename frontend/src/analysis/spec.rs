@@ -12,7 +12,7 @@ use super::types::{
     widen, wrap,
 };
 use super::{Analyzer, State, TypeSource};
-use crate::diagnostics::{semantic as rules, types as type_rules};
+use crate::diagnostics::{Diagnostic, semantic as rules, types as type_rules};
 use crate::source::Span;
 use crate::syntax::ast::{ArrayDim, EnumValue, Expr, Ident, Range, TypeSpec, TypeSpecKind, VarDecl};
 use crate::syntax::symbol::Symbol;
@@ -74,7 +74,13 @@ impl<'a> Analyzer<'a> {
         } else {
             let known: Vec<Symbol> = self.type_names.keys().copied().collect();
             let message = format!("there is no type `{}`", self.spelling(ident));
-            self.report_unknown(&rules::UNKNOWN_TYPE, ident, message, known.into_iter());
+            match elementary_meant(self.text(ident.symbol)) {
+                Some(meant) if !self.may_be_lost(ident.span) => {
+                    let found = Diagnostic::new(&rules::UNKNOWN_TYPE, ident.span, message);
+                    self.push(found.help(format!("did you mean `{meant}`?")));
+                }
+                _ => self.report_unknown(&rules::UNKNOWN_TYPE, ident, message, known.into_iter()),
+            }
         }
         (Ty::Error, Value::Zero)
     }
@@ -82,11 +88,14 @@ impl<'a> Analyzer<'a> {
     /// The type that a declared name stands for, resolving it when it is first asked for.
     pub(super) fn named_type(&mut self, symbol: Symbol, span: Span) -> (Ty, Value) {
         let Some(entry) = self.type_names.get_mut(&symbol) else { return (Ty::Error, Value::Zero) };
+        let entry_span = entry.span;
         let source = match &entry.state {
             State::Done(done) => return done.clone(),
             State::Busy => {
                 let message = format!("`{}` contains itself, so it would have no end", self.text(symbol));
-                self.report(&rules::RECURSIVE_TYPE, span, message);
+                let declared = entry_span;
+                let found = Diagnostic::new(&rules::RECURSIVE_TYPE, span, message).label(declared, "declared here");
+                self.push(found.help("a part of a type is of another type"));
                 return (Ty::Error, Value::Zero);
             }
             State::Waiting => {
@@ -205,7 +214,7 @@ impl<'a> Analyzer<'a> {
         let (least, most) = limits(elementary).unwrap_or((0, 0));
         let mut next: i128 = 0;
         let mut list: Vec<(Symbol, String, i64)> = Vec::with_capacity(values.len());
-        let mut seen = std::collections::BTreeSet::new();
+        let mut seen: std::collections::BTreeMap<Symbol, Span> = std::collections::BTreeMap::new();
         for value in values {
             if value.name.is_missing() {
                 continue;
@@ -218,9 +227,10 @@ impl<'a> Analyzer<'a> {
                 self.report(&type_rules::LITERAL_RANGE, value.name.span, message);
                 next = 0;
             }
-            if !seen.insert(value.name.symbol) {
+            if let Some(first) = seen.insert(value.name.symbol, value.name.span) {
                 let message = format!("the value `{}` is there twice", self.spelling(&value.name));
-                self.report(&rules::DUPLICATE_NAME, value.name.span, message);
+                let found = Diagnostic::new(&rules::DUPLICATE_NAME, value.name.span, message);
+                self.push(found.label(first, "first here").help("give one of them another name"));
                 continue;
             }
             list.push((value.name.symbol, self.spelling(&value.name).to_owned(), wrap(elementary, next)));
@@ -314,7 +324,7 @@ impl<'a> Analyzer<'a> {
     /// The fields of a structure or union, all at offset 0. `None`: a type among them is wrong, which was reported.
     pub(super) fn field_list(&mut self, fields: &'a [VarDecl], scope: Option<PouId>) -> Option<Vec<FieldDef>> {
         let mut list: Vec<FieldDef> = Vec::new();
-        let mut seen = std::collections::BTreeSet::new();
+        let mut seen: std::collections::BTreeMap<Symbol, Span> = std::collections::BTreeMap::new();
         let mut sound = true;
         for field in fields {
             let (ty, default) = self.resolve_spec(&field.ty, scope);
@@ -324,9 +334,13 @@ impl<'a> Analyzer<'a> {
                 None => default,
             };
             for ident in &field.names {
-                if !seen.insert(ident.symbol) && !ident.is_missing() {
+                if ident.is_missing() {
+                    continue;
+                }
+                if let Some(first) = seen.insert(ident.symbol, ident.span) {
                     let message = format!("the field `{}` is there twice", self.spelling(ident));
-                    self.report(&rules::DUPLICATE_NAME, ident.span, message);
+                    let found = Diagnostic::new(&rules::DUPLICATE_NAME, ident.span, message);
+                    self.push(found.label(first, "first here").help("give one of them another name"));
                     continue;
                 }
                 let (symbol, name) = (ident.symbol, self.spelling(ident).to_owned());
@@ -372,4 +386,32 @@ impl<'a> Analyzer<'a> {
         };
         Some(self.types.add(TyDef { name, kind, size, align, default, depth, alternatives }))
     }
+}
+
+/// The elementary type that is called so elsewhere, or that is spelt nearly so (in upper case).
+fn elementary_meant(name: &str) -> Option<&'static str> {
+    const ELSEWHERE: [(&str, &str); 19] = [
+        ("BOOLEAN", "BOOL"),
+        ("BIT", "BOOL"),
+        ("FLOAT", "REAL"),
+        ("FLOAT32", "REAL"),
+        ("FLOAT64", "LREAL"),
+        ("DOUBLE", "LREAL"),
+        ("INTEGER", "INT"),
+        ("SHORT", "INT"),
+        ("LONG", "DINT"),
+        ("UNSIGNED", "UDINT"),
+        ("INT8", "SINT"),
+        ("INT16", "INT"),
+        ("INT32", "DINT"),
+        ("INT64", "LINT"),
+        ("UINT8", "USINT"),
+        ("UINT16", "UINT"),
+        ("UINT32", "UDINT"),
+        ("UINT64", "ULINT"),
+        ("STR", "STRING"),
+    ];
+    let known = ELSEWHERE.iter().find(|(other, _)| *other == name).map(|(_, own)| *own);
+    let all = khz_bytecode::container::ElementaryType::ALL.iter().map(|ty| ty.name()).chain(["STRING"]);
+    known.or_else(|| crate::diagnostics::similar::nearest(name, all.map(|own| (own, own))))
 }

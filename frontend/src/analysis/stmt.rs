@@ -81,7 +81,8 @@ impl<'a> Checker<'_, 'a> {
                 StmtKind::Repeat { body, until }
             }
             ast::StmtKind::Exit | ast::StmtKind::Continue if self.loop_depth == 0 => {
-                self.an.report(&names::OUTSIDE_LOOP, span, "EXIT and CONTINUE stand inside a loop");
+                let found = Diagnostic::new(&names::OUTSIDE_LOOP, span, "EXIT and CONTINUE stand inside a loop");
+                self.an.push(found.help("leave the program, function or function block with `RETURN`"));
                 return None;
             }
             ast::StmtKind::Exit => StmtKind::Exit,

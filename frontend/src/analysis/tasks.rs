@@ -7,7 +7,7 @@ use super::Analyzer;
 use super::expr::{Checker, Environment};
 use super::tree::{ExprKind, ResourcePlan, Root, SinglePlan, TaskPlan, VarClass, VarId};
 use super::types::{BOOL, Const, Ty, is_duration};
-use crate::diagnostics::semantic as rules;
+use crate::diagnostics::{Diagnostic, semantic as rules};
 use crate::source::Span;
 use crate::syntax::ast::{Attribute, Expr, ExprKind as AstKind, Task, TaskParamKind};
 use crate::syntax::symbol::Symbol;
@@ -180,7 +180,12 @@ impl<'a> Analyzer<'a> {
         } else {
             format!("SINGLE is a BOOL, not {}", self.types.name(ty))
         };
-        self.report(&rules::SINGLE, span, message);
+        let help = if ty == BOOL {
+            "assign what it is to a global BOOL in a program, and name that"
+        } else {
+            "compare it in a program, and name the global BOOL that the result is assigned to"
+        };
+        self.push(Diagnostic::new(&rules::SINGLE, span, message).help(help));
     }
 }
 

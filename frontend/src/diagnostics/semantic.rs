@@ -276,4 +276,9 @@ rules! {
         wrong "TYPE\n  C : (red, yellow, green);\nEND_TYPE\nPROGRAM p\nVAR\n  c : C;\n  a : INT;\nEND_VAR\n  CASE c OF\n    red: a := 1;\n    green: a := 2;\n  END_CASE;\nEND_PROGRAM\n"
         right "TYPE\n  C : (red, yellow, green);\nEND_TYPE\nPROGRAM p\nVAR\n  c : C;\n  a : INT;\nEND_VAR\n  CASE c OF\n    red: a := 1;\n    green: a := 2;\n  ELSE\n    a := 0;\n  END_CASE;\nEND_PROGRAM\n"
     }
+    UNDERSCORES = "S0078" Warning "a name with underscores where the standard has none" {
+        "A name is made of letters, digits and single underscores between or before them (6.1.2). This compiler takes the others too; many do not."
+        wrong "PROGRAM p\nVAR\n  a__b : INT;\nEND_VAR\n  a__b := a__b + 1;\nEND_PROGRAM\n"
+        right "PROGRAM p\nVAR\n  a_b : INT;\nEND_VAR\n  a_b := a_b + 1;\nEND_PROGRAM\n"
+    }
 }

@@ -15,6 +15,7 @@ mod real_equality;
 mod self_assignment;
 mod shadowed_global;
 mod typed;
+mod underscores;
 mod unused_variable;
 mod walk;
 
@@ -31,7 +32,7 @@ struct Linted<'a> {
 }
 
 /// The rules.
-const RULES: [fn(&Linted<'_>, &mut Vec<Diagnostic>); 9] = [
+const RULES: [fn(&Linted<'_>, &mut Vec<Diagnostic>); 10] = [
     unused_variable::look,
     output_never_written::look,
     self_assignment::look,
@@ -41,6 +42,7 @@ const RULES: [fn(&Linted<'_>, &mut Vec<Diagnostic>); 9] = [
     literal_condition::look,
     real_equality::look,
     fixed_comparison::look,
+    underscores::look,
 ];
 
 /// Everything that the rules have to say about a program without errors.

@@ -144,6 +144,12 @@ impl Parser<'_> {
             expr = match self.kind() {
                 TokenKind::Dot => self.member(expr),
                 TokenKind::LeftBracket => self.index(expr),
+                TokenKind::Caret if self.at_foreign_power() => {
+                    self.report_foreign("^", "**");
+                    let op_span = self.bump();
+                    let exponent = self.nested(Self::unary, Self::error_expr);
+                    return self.binary_node(BinaryOp::Power, op_span, expr, exponent);
+                }
                 TokenKind::Caret => {
                     let end = self.bump();
                     let (below, span) = (self.height(&expr), expr.span.to(end));

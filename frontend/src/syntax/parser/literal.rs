@@ -13,6 +13,19 @@ use crate::syntax::lexer::TokenKind;
 /// What is wrong with a literal: the rule, the message, the help.
 type Fault = (&'static Rule, String, Option<&'static str>);
 
+/// What a number with letters behind it was meant to be.
+fn malformed_hint(text: &str) -> Option<&'static str> {
+    let lower = text.to_ascii_lowercase();
+    let unit = lower.trim_start_matches(|c: char| c.is_ascii_digit() || c == '.' || c == '_');
+    Some(match unit {
+        _ if lower.starts_with("0x") => "hexadecimal numbers are written `16#1F`",
+        _ if lower.starts_with("0b") => "binary numbers are written `2#101`",
+        _ if lower.starts_with("0o") => "octal numbers are written `8#17`",
+        "d" | "h" | "m" | "s" | "ms" | "us" | "ns" => "durations are written `T#5s`",
+        _ => "a name begins with a letter or `_`, and units stand in a comment",
+    })
+}
+
 impl Parser<'_> {
     /// `literal = [ sign ] token`; the type and its `#` have been read. None if it has been reported.
     pub(super) fn literal(&mut self, ty: Option<Ident>) -> Option<Literal> {
@@ -35,7 +48,7 @@ impl Parser<'_> {
             TokenKind::WString => wide_string(text),
             // Reported by the lexer's caller.
             TokenKind::UnterminatedString => return None,
-            _ => Err((&rules::BAD_NUMBER, format!("`{text}` is neither a number nor a name"), None)),
+            _ => Err((&rules::BAD_NUMBER, format!("`{text}` is neither a number nor a name"), malformed_hint(text))),
         };
         match value {
             Ok(value) => Some(Literal { ty, value: as_bool(ty.map(|ty| self.slice(ty.span)), value) }),

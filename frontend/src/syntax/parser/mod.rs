@@ -12,6 +12,7 @@
 
 mod config;
 mod expr;
+mod hints;
 mod init;
 mod literal;
 mod pou;
@@ -67,6 +68,8 @@ struct OpenBlocks {
     fors: u32,
     whiles: u32,
     repeats: u32,
+    /// Whether an `ELSE IF` stood somewhere before: two statements, each with an end of its own.
+    else_ifs: bool,
 }
 
 /// The state of parsing one file.
@@ -170,7 +173,12 @@ impl<'a> Parser<'a> {
                     );
                 }
                 TokenKind::Unknown => {
-                    self.push(unknown_characters(span, self.slice(span)));
+                    let text = self.slice(span);
+                    let line = self.text.get(..span.start as usize).map(|before| before.rsplit('\n').next());
+                    // A second one of the line is the end of what the first one began.
+                    if !line.flatten().is_some_and(|line| line.contains(text)) {
+                        self.push(unknown_characters(span, text));
+                    }
                     // White space of other kinds comes with pasted text; leaving it out is the best guess.
                     if self.slice(span).chars().all(|found| found.is_whitespace() || found == '\u{FEFF}') {
                         continue;
@@ -306,13 +314,15 @@ impl<'a> Parser<'a> {
     /// Reports that `what` should stand at the current token.
     fn report_expected(&mut self, what: &str) {
         let message = format!("expected {what}, found {}", self.found());
-        self.report(Diagnostic::new(&rules::EXPECTED, self.span(), message));
+        let help = self.foreign_hint().map_or_else(|| format!("write {what} there"), str::to_owned);
+        self.report(Diagnostic::new(&rules::EXPECTED, self.span(), message).help(help));
     }
 
     /// Reports that `what` should stand behind the token before the current one.
     fn report_missing(&mut self, what: &str, after: &str) {
         let message = format!("expected {what} after {after}, found {}", self.found());
-        self.report(Diagnostic::new(&rules::EXPECTED, self.prev_span().after(), message));
+        let help = self.foreign_hint().map_or_else(|| format!("write {what} there"), str::to_owned);
+        self.report(Diagnostic::new(&rules::EXPECTED, self.prev_span().after(), message).help(help));
     }
 
     /// The current token as messages name it.
@@ -347,13 +357,21 @@ impl<'a> Parser<'a> {
         if self.eat_keyword(word).is_some() {
             return true;
         }
-        if self.at(TokenKind::Ident) && spelling::is_like(self.slice(self.span()), word.text()) {
+        if self.at(TokenKind::Ident) && (spelling::is_like(self.slice(self.span()), word.text()) || self.prolongs(word))
+        {
             self.report_misspelt(word);
             self.bump();
             return true;
         }
         self.report_missing(&format!("`{}`", word.text()), after);
         false
+    }
+
+    /// `DOO`: a letter more than the word, and nothing that could go on from there.
+    fn prolongs(&self, word: Keyword) -> bool {
+        let text = self.slice(self.span()).to_ascii_uppercase();
+        let goes_on = matches!(self.kind_at(1), TokenKind::Ident | TokenKind::Keyword(_));
+        goes_on && !self.on_new_line() && text.len() == word.text().len() + 1 && text.starts_with(word.text())
     }
 
     /// Reads a name, or reports that `what` is missing and makes one up.
@@ -365,7 +383,8 @@ impl<'a> Parser<'a> {
             && matches!(self.kind_at(1), TokenKind::Colon | TokenKind::Comma | TokenKind::Assign)
         {
             let message = format!("`{}` is a reserved word and cannot be a name", word.text());
-            self.report(Diagnostic::new(&rules::RESERVED_WORD, self.span(), message));
+            let help = "give it another name, `_` and a letter more for example";
+            self.report(Diagnostic::new(&rules::RESERVED_WORD, self.span(), message).help(help));
             return self.take_name();
         }
         self.report_expected(what);
@@ -469,6 +488,9 @@ fn unknown_characters(span: Span, text: &str) -> Diagnostic {
         Some('\u{2013}' | '\u{2014}' | '\u{2212}') => found.help("this is a typographic dash; minus is `-`"),
         Some(first) if first.is_whitespace() => found.help("replace it by an ordinary space"),
         Some('|') => found.help("or is written `OR`"),
+        Some('`') => found.help("strings stand in `'`"),
+        Some('?') => found.help("choose with `SEL(condition, if_false, if_true)`"),
+        Some('~') => found.help("the complement is `NOT a`"),
         _ => found,
     }
 }

@@ -113,6 +113,11 @@ impl Parser<'_> {
             self.become_keyword(closing);
             return true;
         }
+        if let Some(word) = self.bare_end() {
+            self.report_misspelt(word);
+            self.become_keyword(word);
+            return true;
+        }
         let text = self.slice(self.span());
         let next = self.kind_at(1);
         let meant = |word: Keyword| leads(word) && goes_before(word, next) && is_like(text, word.text());

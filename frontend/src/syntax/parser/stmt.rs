@@ -91,7 +91,8 @@ impl Parser<'_> {
     fn misplaced_section(&mut self) -> bool {
         let Some(word) = self.keyword().filter(|word| word.starts_section()) else { return false };
         let message = format!("`{}` must stand before the first statement", word.text());
-        self.report(Diagnostic::new(&rules::MISPLACED_SECTION, self.span(), message));
+        let found = Diagnostic::new(&rules::MISPLACED_SECTION, self.span(), message);
+        self.report(found.help("move it up, in front of the statements"));
         let attributes = self.attributes();
         match super::vars::section_kind(word) {
             Some(kind) => {
@@ -149,26 +150,37 @@ impl Parser<'_> {
             TokenKind::Ident if self.at_mock() => self.mock_statement(),
             TokenKind::Ident | TokenKind::Direct | TokenKind::MalformedDirect => self.simple_statement(),
             _ => {
-                self.report_expected("a statement");
+                let message = format!("expected a statement, found {}", self.found());
+                let hint = self.foreign_hint().unwrap_or("a statement begins with a name or a word like `IF`");
+                self.report(Diagnostic::new(&rules::EXPECTED, self.span(), message).help(hint));
                 self.bump();
                 self.skip_statement();
                 return Stmt { kind: StmtKind::Error, span: self.span_from(start) };
             }
         };
         let span = self.span_from(start);
-        self.end_statement(&kind);
-        Stmt { kind, span }
+        if self.end_statement(&kind) {
+            return Stmt { kind, span };
+        }
+        // Something stands behind it that is no part of it: what was meant is not known.
+        Stmt { kind: StmtKind::Error, span }
     }
 
     fn jump(&mut self, kind: StmtKind) -> StmtKind {
         self.bump();
+        let gives = matches!(kind, StmtKind::Return) && !self.at(TokenKind::Semicolon) && !self.on_new_line();
+        if gives && (self.at(TokenKind::Ident) || super::expr::literal_start(self.kind())) {
+            let message = format!("expected `;` after `RETURN`, found {}", self.found());
+            let found = Diagnostic::new(&rules::EXPECTED, self.span(), message);
+            self.report(found.help("a function gives what is assigned to its name: `name := value; RETURN;`"));
+        }
         kind
     }
 
-    /// The `;` of a statement. After an `END_…` it may be left out, as vendors allow.
-    fn end_statement(&mut self, kind: &StmtKind) {
+    /// The `;` of a statement. After an `END_…` it may be left out, as vendors allow. FALSE: something else stood before it.
+    fn end_statement(&mut self, kind: &StmtKind) -> bool {
         if self.eat(TokenKind::Semicolon).is_some() {
-            return;
+            return true;
         }
         let compound = matches!(
             kind,
@@ -179,9 +191,9 @@ impl Parser<'_> {
                 | StmtKind::Repeat { .. }
         );
         if compound {
-            return;
+            return true;
         }
-        if !matches!(kind, StmtKind::Error) {
+        if !matches!(kind, StmtKind::Error) && self.reported_at != Some(self.pos) {
             self.report_missing("`;`", "this statement");
         }
         let word_follows = self
@@ -191,6 +203,7 @@ impl Parser<'_> {
         if !next_follows {
             self.skip_statement();
         }
+        next_follows
     }
 
     /// Skips to behind the next `;` or to a word that begins or ends a statement, section or declaration. May not move
@@ -231,7 +244,9 @@ impl Parser<'_> {
             TokenKind::Assign => {
                 self.bump();
             }
-            TokenKind::Equal | TokenKind::Foreign if self.slice(op_span).starts_with('=') => {
+            TokenKind::Equal | TokenKind::Foreign
+                if self.slice(op_span).starts_with('=') && self.kind_at(1) != TokenKind::Colon =>
+            {
                 let message = format!("`{}` compares; it does not assign", self.slice(op_span));
                 self.report(Diagnostic::new(&rules::EQUALS_FOR_ASSIGN, op_span, message).help("assign with `:=`"));
                 self.bump();
@@ -242,9 +257,18 @@ impl Parser<'_> {
                 self.bump();
                 self.bump();
             }
+            TokenKind::Equal if self.kind_at(1) == TokenKind::Colon => {
+                let message = "`:=` is written the other way round";
+                self.report(Diagnostic::new(&rules::EQUALS_FOR_ASSIGN, op_span, message).help("write `:=`"));
+                self.bump();
+                self.bump();
+            }
             TokenKind::Ident if self.at_word("REF") && self.kind_at(1) == TokenKind::Equal => {
                 self.report_unsupported("`REF=`");
                 self.skip_statement();
+                return StmtKind::Error;
+            }
+            _ if !matches!(target.kind, ExprKind::Error) && self.loose_expression(target.span) => {
                 return StmtKind::Error;
             }
             _ => return self.call_statement(target),
@@ -265,9 +289,10 @@ impl Parser<'_> {
             _ if self.at(TokenKind::Semicolon) || self.on_new_line() => {
                 let message = "this has a value and does nothing with it";
                 if self.reported_at != Some(self.pos) {
+                    let help = self.word_hint(self.slice(expr.span));
                     self.push(
                         Diagnostic::new(&rules::NO_STATEMENT, expr.span, message)
-                            .help("assign to it with `:=`, or call it with `(…)`"),
+                            .help(help.unwrap_or("assign to it with `:=`, or call it with `(…)`")),
                     );
                 }
                 self.reported_at = Some(self.pos);
@@ -330,6 +355,7 @@ impl Parser<'_> {
                 }
                 Some(Keyword::Else) if otherwise.is_none() => {
                     self.bump();
+                    self.open.else_ifs |= self.at_keyword(Keyword::If) && !self.on_new_line();
                     otherwise = Some(self.block());
                 }
                 // A second ELSE belongs to an outer IF, if there is one, and this IF has lost its end.
@@ -369,6 +395,13 @@ impl Parser<'_> {
             } else if self.block_ends() {
                 break;
             } else {
+                if self.at_keyword(Keyword::Case) {
+                    let message = "each arm of a CASE begins with its labels, without a word";
+                    let found = Diagnostic::new(&rules::EXPECTED, self.span(), message);
+                    self.report(found.help("leave `CASE` out: `1: …`"));
+                    self.bump();
+                    continue;
+                }
                 if !self.mend_leading_word() {
                     self.report_expected("the label of a CASE arm");
                 }

@@ -201,7 +201,11 @@ impl Parser<'_> {
     fn array_type(&mut self) -> TypeSpecKind {
         self.bump();
         let mut dims = Vec::new();
-        let has_bounds = self.expect(TokenKind::LeftBracket, "`ARRAY`");
+        let round = self.at(TokenKind::LeftParen);
+        let has_bounds = self.expect(TokenKind::LeftBracket, "`ARRAY`") || round;
+        if round {
+            self.bump();
+        }
         if !has_bounds && self.at_keyword(Keyword::Array) {
             return self.nested(Self::array_type, |_| TypeSpecKind::Error);
         }
@@ -215,7 +219,9 @@ impl Parser<'_> {
                     break;
                 }
             }
-            self.close(TokenKind::RightBracket, "the bounds");
+            if !(round && self.eat(TokenKind::RightParen).is_some()) {
+                self.close(TokenKind::RightBracket, "the bounds");
+            }
         }
         self.expect_keyword(Keyword::Of, "the bounds of the array");
         let element = Box::new(self.type_spec());
@@ -237,7 +243,12 @@ impl Parser<'_> {
     pub(super) fn missing_end(&mut self, end: Keyword, opener: &str, open: Span) {
         let message = format!("expected `{}`, found {}", end.text(), self.found());
         let span = if self.at_end() { self.prev_span().after() } else { self.span() };
-        let found = Diagnostic::new(&rules::MISSING_END, span, message);
+        let help = if end == Keyword::EndIf && self.open.else_ifs {
+            "`ELSE IF` begins another IF with an END_IF of its own; `ELSIF` goes on with the same one".to_owned()
+        } else {
+            format!("write `{}` there", end.text())
+        };
+        let found = Diagnostic::new(&rules::MISSING_END, span, message).help(help);
         self.report(found.label(open, format!("this {opener} has no `{}`", end.text())));
     }
 }

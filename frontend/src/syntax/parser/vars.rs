@@ -1,10 +1,12 @@
 //! Variable sections and declarations (IEC 61131-3 6.5).
 
+use khz_bytecode::container::ElementaryType;
+
 use super::Parser;
 use crate::diagnostics::{Diagnostic, syntax as rules};
 use crate::source::Span;
 use crate::syntax::ast::{
-    Attribute, DirectAddress, Edge, Retention, TypeSpec, TypeSpecKind, VarDecl, VarKind, VarSection,
+    Attribute, DirectAddress, Edge, Ident, Retention, TypeSpec, TypeSpecKind, VarDecl, VarKind, VarSection,
 };
 use crate::syntax::keyword::Keyword;
 use crate::syntax::lexer::TokenKind;
@@ -134,7 +136,9 @@ impl Parser<'_> {
                 }
                 _ => {
                     self.drop_attributes(attributes);
-                    self.report_expected(&format!("a declaration or `{}`", list.end.text()));
+                    let message = format!("expected a declaration or `{}`, found {}", list.end.text(), self.found());
+                    let help = "a declaration is `name : INT;`; a name begins with a letter or `_`";
+                    self.report(Diagnostic::new(&rules::EXPECTED, self.span(), message).help(help));
                     self.names_lost = true;
                     // The first name of a list is missing.
                     let goes_on = self.at(TokenKind::Comma) && self.kind_at(1) == TokenKind::Ident;
@@ -188,6 +192,12 @@ impl Parser<'_> {
             }
             names.push(self.declared_name("the name of a variable"));
         }
+        if let Some(ty) = self.type_before_name(&mut names) {
+            let init = self.optional_init();
+            let span = self.span_from(start);
+            self.end_declaration(end);
+            return VarDecl { names, address: None, ty, edge: None, init, attributes, span };
+        }
         let address = self.location();
         let ty = self.declared_type("the name of the variable");
         let edge = self.edge();
@@ -195,6 +205,21 @@ impl Parser<'_> {
         let span = self.span_from(start);
         self.end_declaration(end);
         VarDecl { names, address, ty, edge, init, attributes, span }
+    }
+
+    /// `int a;`, as other languages declare: says so, and puts the name in the place of the type's.
+    fn type_before_name(&mut self, names: &mut [Ident]) -> Option<TypeSpec> {
+        let [first] = names else { return None };
+        let ends = matches!(self.kind_at(1), TokenKind::Semicolon | TokenKind::Assign);
+        let is_type = |text: &str| ElementaryType::ALL.iter().any(|ty| ty.name().eq_ignore_ascii_case(text));
+        if !(self.at(TokenKind::Ident) && ends && !self.on_new_line() && is_type(self.slice(first.span))) {
+            return None;
+        }
+        let help = format!("write `{} : {};`", self.slice(self.span()), self.slice(first.span));
+        let found = Diagnostic::new(&rules::EXPECTED, first.span, "the name of a variable stands before its type");
+        self.report(found.help(help));
+        let ty = std::mem::replace(first, self.take_name());
+        Some(TypeSpec { kind: TypeSpecKind::Named(ty), span: ty.span })
     }
 
     /// `[ 'AT' direct-address ]`.
@@ -232,8 +257,7 @@ impl Parser<'_> {
             return;
         }
         if self.reported_at != Some(self.pos) {
-            let message = format!("expected `;` after this declaration, found {}", self.found());
-            self.report(Diagnostic::new(&rules::EXPECTED, self.prev_span().after(), message));
+            self.report_missing("`;`", "this declaration");
         }
         let next_follows = self.on_new_line() && matches!(self.kind_at(1), TokenKind::Colon | TokenKind::Comma);
         if !next_follows {
