@@ -61,12 +61,14 @@ pub fn instructions_markdown() -> String {
         let name = format!("`{}`", op.mnemonic());
         row(&mut out, &[&opcode(*op as u16), &name, &stack, &traps, &op.cost(), &op.meaning()]);
     }
-    out.push_str("\n## Strings in memory\n\nOne capacity (u16) follows the opcode for each `dst` (writable) and `src` string, in their order.\n\n");
+    out.push_str("\n## Strings in memory\n\nOne capacity (u16) follows the opcode for each `dst` (writable) and `src` STRING and each `wide-dst` (writable) and `wide-src` WSTRING, in their order.\n\n");
     heading(&mut out, &["opcode", "instruction", "stack", "cost", "meaning"]);
     for op in HelperOp::ALL {
         let operands = op.operands().iter().map(|operand| match operand {
             HelperOperand::Dst => "dst",
             HelperOperand::Src => "src",
+            HelperOperand::WideDst => "wide-dst",
+            HelperOperand::WideSrc => "wide-src",
             HelperOperand::Value(ty) => ty.name(),
         });
         let result = op.result().map_or("", |ty| ty.name());

@@ -39,7 +39,7 @@ fn assertions_want_their_operands() {
             t.st:2:1 S0060 ASSERT_EQ takes ACTUAL, EXPECTED
             t.st:3:22 S0060 ASSERT_EQ takes ACTUAL, EXPECTED and a message
             t.st:4:24 S0060 ASSERT_EQ takes ACTUAL, EXPECTED and a message
-            t.st:5:17 T0001 a message is a STRING, not an integer literal
+            t.st:5:17 T0001 a message is a STRING or WSTRING, not an integer literal
             t.st:6:1 S0060 ASSERT_TRUE takes IN
         "#]],
     );

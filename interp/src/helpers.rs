@@ -37,6 +37,12 @@ macro_rules! operand {
     (Src, $operands:ident) => {
         $operands.string()
     };
+    (WideDst, $operands:ident) => {
+        $operands.string()
+    };
+    (WideSrc, $operands:ident) => {
+        $operands.string()
+    };
     ($value:ident, $operands:ident) => {
         $operands.value()
     };

@@ -128,6 +128,12 @@ macro_rules! abi {
     (Src) => {
         u64
     };
+    (WideDst) => {
+        u64
+    };
+    (WideSrc) => {
+        u64
+    };
     (I32) => {
         i32
     };
@@ -149,6 +155,12 @@ macro_rules! pass {
         string_place($value)
     };
     (Src, $value:ident) => {
+        string_place($value)
+    };
+    (WideDst, $value:ident) => {
+        string_place($value)
+    };
+    (WideSrc, $value:ident) => {
         string_place($value)
     };
     ($other:ident, $value:ident) => {

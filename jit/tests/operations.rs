@@ -140,6 +140,13 @@ fn stores_wrap_and_loads_extend_in_every_place() {
     }
 }
 
+/// Initial value of a wide string: the text and a character that has no narrow form.
+fn wide_init(at: u32, text: &str) -> String {
+    let units = text.encode_utf16().chain([0x20AC]).take(20);
+    let bytes: String = units.flat_map(u16::to_le_bytes).map(|byte| format!("{byte:02x}")).collect();
+    format!("init d {at} bytes {bytes}\n")
+}
+
 #[test]
 fn every_string_row_does_what_it_means() {
     let texts = ["", "motor", "TRUE", "-12.5e1", "T#1m30s", "12345678901234567890"];
@@ -152,14 +159,19 @@ fn every_string_row_does_what_it_means() {
             let mut names = [("b", 40u32), ("c", 80u32)].into_iter();
             for operand in op.operands() {
                 match operand {
-                    HelperOperand::Dst => {
-                        places.push(16);
-                        code.push_str("address d a s\n");
+                    HelperOperand::Dst | HelperOperand::WideDst => {
+                        places.push(if operand.is_wide() { 116 } else { 16 });
+                        code.push_str(if operand.is_wide() { "address d wa w\n" } else { "address d a s\n" });
                     }
                     HelperOperand::Src => {
                         let (name, at) = names.next().unwrap();
                         places.push(at);
                         let _ = writeln!(code, "address d {name} s");
+                    }
+                    HelperOperand::WideSrc => {
+                        let (name, at) = names.next().unwrap();
+                        places.push(if at == 40 { 160 } else { 204 });
+                        let _ = writeln!(code, "address d w{name} w");
                     }
                     HelperOperand::Value(ty) => {
                         let value = edges(*ty)[(round + 1) % 6];
@@ -173,7 +185,10 @@ fn every_string_row_does_what_it_means() {
             let store = if op.result().is_some() { "slot.store g r\n" } else { "" };
             let text = format!(
                 "{result}type s string 20\ndata a s at 16\ndata b s at 40\ndata c s at 80\ninit d 16 string \"before\"\n
-                 init d 40 string \"{text}\"\ninit d 80 string \"{other}\"\nfunction main\n{code}{}{capacities}\n{store}return\nend\n",
+                 init d 40 string \"{text}\"\ninit d 80 string \"{other}\"\n
+                 type w wstring 20\ndata wa w at 116\ndata wb w at 160\ndata wc w at 204\n{}{}function main\n{code}{}{capacities}\n{store}return\nend\n",
+                wide_init(160, text),
+                wide_init(204, other),
                 op.mnemonic()
             );
             let mut run = load(&text, false);
@@ -185,7 +200,7 @@ fn every_string_row_does_what_it_means() {
             if let Some(value) = value {
                 assert_eq!(run.slot(0), value.bits(), "{}", op.mnemonic());
             }
-            assert_eq!(run.data(0, 112), &expected.bytes()[start as usize..][..112], "{}", op.mnemonic());
+            assert_eq!(run.data(0, 248), &expected.bytes()[start as usize..][..248], "{}", op.mnemonic());
         }
     }
 }

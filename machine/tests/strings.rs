@@ -23,53 +23,72 @@ impl Random {
     }
 }
 
-fn characters(memory: &[u8], place: StringPlace) -> Vec<u8> {
-    let room = memory.iter().skip(place.at as usize).take(place.capacity.into());
-    room.copied().take_while(|byte| *byte != 0).collect()
+/// Characters of `unit` bytes before the terminator.
+fn characters(memory: &[u8], place: StringPlace, unit: usize) -> Vec<u16> {
+    let room = &memory[place.at as usize..][..unit * usize::from(place.capacity)];
+    let all = room.chunks(unit).map(|bytes| u16::from(bytes[0]) | u16::from(*bytes.get(1).unwrap_or(&0)) << 8);
+    all.take_while(|character| *character != 0).collect()
 }
 
-fn cut(text: &[u8], from: i64, to: i64) -> Vec<u8> {
+fn bytes_of(text: &[u16], unit: usize) -> Vec<u8> {
+    text.iter().flat_map(|character| character.to_le_bytes().into_iter().take(unit)).collect()
+}
+
+fn cut(text: &[u16], from: i64, to: i64) -> Vec<u16> {
     let index = |at: i64| at.clamp(0, text.len() as i64) as usize;
     text[index(from)..index(to).max(index(from))].to_vec()
 }
 
 /// The text that a row with a destination makes; `None` for rows without one.
-fn model(op: HelperOp, s: &[Vec<u8>], v: &[i64]) -> Option<Vec<u8>> {
+fn model(op: HelperOp, s: &[Vec<u16>], v: &[i64]) -> Option<Vec<u16>> {
+    use HelperOp as H;
     let position = |at: usize| (v[at] - 1).max(0);
     let count = |at: usize| v[at].max(0);
     Some(match op {
-        HelperOp::StringAssign => s[0].clone(),
-        HelperOp::StringLeft => cut(&s[0], 0, v[0]),
-        HelperOp::StringRight => cut(&s[0], s[0].len() as i64 - count(0), s[0].len() as i64),
-        HelperOp::StringMid => cut(&s[0], position(1), position(1) + count(0)),
-        HelperOp::StringConcat => [&s[0][..], &s[1]].concat(),
-        HelperOp::StringInsert => [&cut(&s[0], 0, v[0])[..], &s[1], &cut(&s[0], v[0], 1 << 20)].concat(),
-        HelperOp::StringDelete => [cut(&s[0], 0, position(1)), cut(&s[0], position(1) + count(0), 1 << 20)].concat(),
-        HelperOp::StringReplace => {
+        H::StringAssign | H::WideAssign | H::WideFromString => s[0].clone(),
+        H::StringFromWide => s[0].iter().map(|c| if *c < 256 { *c } else { u16::from(b'?') }).collect(),
+        H::StringLeft | H::WideLeft => cut(&s[0], 0, v[0]),
+        H::StringRight | H::WideRight => cut(&s[0], s[0].len() as i64 - count(0), s[0].len() as i64),
+        H::StringMid | H::WideMid => cut(&s[0], position(1), position(1) + count(0)),
+        H::StringConcat | H::WideConcat => [&s[0][..], &s[1]].concat(),
+        H::StringInsert | H::WideInsert => [&cut(&s[0], 0, v[0])[..], &s[1], &cut(&s[0], v[0], 1 << 20)].concat(),
+        H::StringDelete | H::WideDelete => {
+            [cut(&s[0], 0, position(1)), cut(&s[0], position(1) + count(0), 1 << 20)].concat()
+        }
+        H::StringReplace | H::WideReplace => {
             [&cut(&s[0], 0, position(1))[..], &s[1], &cut(&s[0], position(1) + count(0), 1 << 20)].concat()
         }
+        H::StringFromChar => vec![v[0] as u16 & 0xFF],
+        H::WideFromChar => vec![v[0] as u16],
         _ => return None,
     })
 }
 
 fn run_one(random: &mut Random, op: HelperOp, size: usize, hostile: bool) {
     let alphabet = 1 + random.below(4);
-    let memory: Vec<u8> =
+    let mut memory: Vec<u8> =
         (0..size).map(|_| if random.below(9) == 0 { 0 } else { b'a' + random.below(alphabet) as u8 }).collect();
-    let place = |random: &mut Random| {
-        let at = random.below(size as u64 - 1);
-        let capacity = random.below(size as u64 - at);
+    if random.below(2) == 0 {
+        // Code units below 256, at even or odd offsets.
+        let first = random.below(2) as usize;
+        memory.iter_mut().skip(first).step_by(2).for_each(|byte| *byte = 0);
+    }
+    let place = |random: &mut Random, unit: u64| {
+        let at = random.below(size as u64 - unit);
+        let capacity = random.below((size as u64 - at) / unit);
         if hostile && random.below(3) == 0 {
             StringPlace { at: random.next() as u32, capacity: random.next() as u16 }
         } else {
             StringPlace { at: at as u32, capacity: capacity as u16 }
         }
     };
-    let strings: Vec<StringPlace> = op.operands().iter().filter(|o| o.is_string()).map(|_| place(random)).collect();
+    let units: Vec<u64> = op.operands().iter().map(|o| u64::from(o.unit_bytes())).filter(|unit| *unit > 0).collect();
+    let strings: Vec<StringPlace> = units.iter().map(|unit| place(random, *unit)).collect();
     let numbers: Vec<i64> = (0..2)
         .map(|_| match random.below(12) {
             0 => i64::from(i32::MIN),
             1 => i64::from(i32::MAX),
+            2 if op.mnemonic().contains("from_") => random.next() as i64,
             _ => random.below(size as u64 + 4) as i64 - 3,
         })
         .collect();
@@ -79,30 +98,39 @@ fn run_one(random: &mut Random, op: HelperOp, size: usize, hostile: bool) {
     if hostile {
         return;
     }
-    let has_destination = op.operands().first() == Some(&HelperOperand::Dst);
-    let sources: Vec<_> = strings.iter().skip(has_destination.into()).map(|p| characters(&memory, *p)).collect();
-    if let Some(text) = model(op, &sources, &numbers) {
+    let texts: Vec<_> = strings.iter().zip(&units).map(|(p, unit)| characters(&memory, *p, *unit as usize)).collect();
+    let sources = &texts[usize::from(op.operands()[0].is_destination())..];
+    use HelperOp as H;
+    if let Some(text) = model(op, sources, &numbers) {
         let mut expected = memory.clone();
-        let dst = strings[0];
-        let text = &text[..text.len().min(dst.capacity.into())];
-        expected[dst.at as usize..][..text.len()].copy_from_slice(text);
-        expected[dst.at as usize + text.len()] = 0;
+        let (dst, unit) = (strings[0], units[0] as usize);
+        let mut text = text[..text.len().min(dst.capacity.into())].to_vec();
+        text.push(0);
+        let bytes = bytes_of(&text, unit);
+        let end = if text[0] == 0 { unit } else { bytes.len() };
+        expected[dst.at as usize..][..end].copy_from_slice(&bytes[..end]);
         assert_eq!(got, expected, "{op:?} {strings:?} {numbers:?}");
-    } else if let HelperOp::StringFind = op {
+    } else if let H::StringFind | H::WideFind = op {
         let found = (0..sources[0].len()).find(|at| sources[0][*at..].starts_with(&sources[1]));
         let expected = found.filter(|_| !sources[1].is_empty()).map_or(0, |at| at as i32 + 1);
         assert_eq!(result, Some(Value::I32(expected)));
-    } else if let HelperOp::StringCompare = op {
+    } else if let H::StringCompare | H::WideCompare = op {
         assert_eq!(result, Some(Value::I32(sources[0].cmp(&sources[1]) as i32)));
-    } else if let HelperOp::StringLen = op {
+    } else if let H::StringLen | H::WideLen = op {
         assert_eq!(result, Some(Value::I32(sources[0].len() as i32)));
     }
+}
+
+/// Whether [`model`] or a branch beside it knows the row, or the row only reads.
+fn is_modelled(op: HelperOp) -> bool {
+    let formats = matches!(op.operands(), [HelperOperand::Dst, HelperOperand::Value(_)]);
+    op == HelperOp::StringFromChar || !formats
 }
 
 #[test]
 fn overlapping_places_read_before_they_write() {
     let mut random = Random(1);
-    for op in HelperOp::ALL.iter().filter(|op| !op.mnemonic().contains("from_")) {
+    for op in HelperOp::ALL.iter().filter(|op| is_modelled(**op)) {
         for round in 0..4000 {
             run_one(&mut random, *op, 8 + round % 60, false);
         }
@@ -133,11 +161,18 @@ fn long_strings_that_cross_each_other() {
         let (a, b, dst) = (place(shift, half), place(0, half), place(shift / 2, 2 * half));
         let mut got = memory.clone();
         string_concat(&mut got, dst, a, b);
-        let text = [characters(&memory, a), characters(&memory, b)].concat();
+        let text = bytes_of(&[characters(&memory, a, 1), characters(&memory, b, 1)].concat(), 1);
         let mut expected = memory.clone();
         expected[dst.at as usize..][..text.len()].copy_from_slice(&text);
         expected[dst.at as usize + text.len()] = 0;
         assert!(got == expected, "{half}");
+        let mut got = memory.clone();
+        let (a, b, dst) = (place(shift, half / 2), place(1, half / 2), place(shift / 2, half));
+        wide_concat(&mut got, dst, a, b);
+        let text = bytes_of(&[characters(&memory, a, 2), characters(&memory, b, 2), vec![0]].concat(), 2);
+        let mut expected = memory.clone();
+        expected[dst.at as usize..][..text.len()].copy_from_slice(&text);
+        assert!(got == expected, "{half} wide");
     }
 }
 
@@ -150,7 +185,7 @@ fn text_of(value: Value) -> String {
         Value::I64(v) => string_from_time(&mut memory, dst, v),
         Value::I32(v) => string_from_bool(&mut memory, dst, v),
     }
-    String::from_utf8(characters(&memory, dst)).unwrap()
+    String::from_utf16(&characters(&memory, dst, 1)).unwrap()
 }
 
 /// Runs a row that reads one string.
@@ -348,7 +383,7 @@ fn dates_and_times_of_day_as_literals() {
             let mut memory = vec![0; 100];
             let dst = StringPlace { at: 3, capacity: 90 };
             from(&mut memory, dst, value);
-            String::from_utf8(characters(&memory, dst)).unwrap()
+            String::from_utf16(&characters(&memory, dst, 1)).unwrap()
         };
         for (value, text) in values {
             assert_eq!(written(*value), *text);

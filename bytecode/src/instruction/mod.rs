@@ -8,6 +8,7 @@ mod immediate;
 
 pub use immediate::{DecodeError, Immediate, Reader, kind};
 
+use crate::container::Type;
 use crate::trap::TrapCode;
 use crate::value::ValueType;
 
@@ -17,10 +18,14 @@ pub const MAX_CAPACITIES: usize = 3;
 /// What a helper instruction takes from the stack.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum HelperOperand {
-    /// A writable reference to a string.
+    /// A writable reference to a `STRING`.
     Dst,
-    /// A readable reference to a string.
+    /// A readable reference to a `STRING`.
     Src,
+    /// A writable reference to a `WSTRING`.
+    WideDst,
+    /// A readable reference to a `WSTRING`.
+    WideSrc,
     /// A value.
     Value(ValueType),
 }
@@ -30,6 +35,38 @@ impl HelperOperand {
     #[must_use]
     pub fn is_string(self) -> bool {
         !matches!(self, HelperOperand::Value(_))
+    }
+
+    /// Whether it is a string that the row writes.
+    #[must_use]
+    pub fn is_destination(self) -> bool {
+        matches!(self, HelperOperand::Dst | HelperOperand::WideDst)
+    }
+
+    /// Whether it is a `WSTRING`.
+    #[must_use]
+    pub fn is_wide(self) -> bool {
+        matches!(self, HelperOperand::WideDst | HelperOperand::WideSrc)
+    }
+
+    /// Bytes of one character of a string operand; 0 for values.
+    #[must_use]
+    pub fn unit_bytes(self) -> u32 {
+        match self {
+            HelperOperand::Dst | HelperOperand::Src => 1,
+            HelperOperand::WideDst | HelperOperand::WideSrc => 2,
+            HelperOperand::Value(_) => 0,
+        }
+    }
+
+    /// The string type that it takes, of this capacity; `None` for values.
+    #[must_use]
+    pub fn string_type(self, capacity: u16) -> Option<Type> {
+        match self.unit_bytes() {
+            0 => None,
+            1 => Some(Type::String { capacity }),
+            _ => Some(Type::WideString { capacity }),
+        }
     }
 }
 
@@ -89,6 +126,12 @@ macro_rules! helper_operand {
     };
     (Src) => {
         HelperOperand::Src
+    };
+    (WideDst) => {
+        HelperOperand::WideDst
+    };
+    (WideSrc) => {
+        HelperOperand::WideSrc
     };
     ($value:ident) => {
         HelperOperand::Value(ValueType::$value)
@@ -331,7 +374,8 @@ impl Instruction {
         match self {
             Instruction::Numeric(op) => op.cost(),
             Instruction::Helper(op, capacities) => {
-                let bytes: u32 = capacities.iter().map(|c| u32::from(*c)).sum();
+                let strings = op.operands().iter().filter(|operand| operand.is_string());
+                let bytes: u32 = strings.zip(capacities).map(|(string, c)| string.unit_bytes() * u32::from(*c)).sum();
                 op.base_cost() + bytes.div_ceil(16)
             }
             other => other.control_op().map_or(0, ControlOp::base_cost).saturating_add(copied_bytes.div_ceil(16)),

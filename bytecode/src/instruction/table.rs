@@ -207,8 +207,8 @@ macro_rules! for_each_numeric {
 /// Instructions that work on strings in memory, in time linear in the strings' lengths.
 ///
 /// Row: `(opcode, Variant, function, "mnemonic", [operands] -> result, cost, "meaning")`. An operand `Dst` is a writable reference to a
-/// `STRING[n]`, `Src` a readable one; each brings its capacity n as a u16 immediate, in operand order. Fuel: `cost` and 1 more for each
-/// 16 bytes of the capacities' sum. `function` is the name of the pure function in `khz_machine::semantics`.
+/// `STRING[n]`, `Src` a readable one, `WideDst` and `WideSrc` are those to a `WSTRING[n]`; each brings its capacity n as a u16 immediate, in
+/// operand order. Fuel: `cost` and 1 more for each 16 bytes of the capacities' sum (a code unit of a `WSTRING` is two bytes). `function` is the name of the pure function in `khz_machine::semantics`.
 #[macro_export]
 macro_rules! for_each_helper {
     ($callback:path) => { $callback! {
@@ -235,12 +235,27 @@ macro_rules! for_each_helper {
         (0x0314, StringToF64, string_to_f64, "string.to_f64", [Src] -> F64, 8, "The longest prefix that is a number, rounded to nearest even; 0 without one."),
         (0x0315, StringToBool, string_to_bool, "string.to_bool", [Src] -> I32, 8, "1 only for 'TRUE' in any case."),
         (0x0316, StringToTime, string_to_time, "string.to_time", [Src] -> I64, 8, "The longest prefix that is a TIME literal (with or without T#), in nanoseconds; 0 without one."),
+        (0x0317, StringFromChar, string_from_char, "string.from_char", [Dst I32] -> Nothing, 8, "The text of one character: the low 8 bits, as they are stored; 0 gives the empty string."),
+        (0x0318, StringFromWide, string_from_wide, "string.from_wide", [Dst WideSrc] -> Nothing, 8, "The narrow form of a wide string: code units above 255 become `?`."),
         (0x0320, StringFromDate, string_from_date, "string.from_date", [Dst I64] -> Nothing, 8, "The day of a moment as a DATE literal, for example D#2024-02-29."),
         (0x0321, StringFromTod, string_from_tod, "string.from_tod", [Dst I64] -> Nothing, 8, "A TIME_OF_DAY (nanoseconds) as its literal, for example TOD#12:34:56.5; outside a day for example TOD#-00:00:01."),
         (0x0322, StringFromDt, string_from_dt, "string.from_dt", [Dst I64] -> Nothing, 8, "A moment as a DATE_AND_TIME literal, for example DT#2024-02-29-12:34:56."),
         (0x0323, StringToDate, string_to_date, "string.to_date", [Src] -> I64, 8, "The longest prefix that is a DATE literal (with or without D#), in nanoseconds since 1970-01-01, saturated; 0 without one."),
         (0x0324, StringToTod, string_to_tod, "string.to_tod", [Src] -> I64, 8, "The longest prefix that is a TIME_OF_DAY literal (with or without TOD#), in nanoseconds, saturated; 0 without one."),
         (0x0325, StringToDt, string_to_dt, "string.to_dt", [Src] -> I64, 8, "The longest prefix that is a DATE_AND_TIME literal (with or without DT#), in nanoseconds since 1970-01-01, saturated; 0 without one."),
+        (0x0340, WideAssign, wide_assign, "wide.assign", [WideDst WideSrc] -> Nothing, 8, "As string.assign, on code units."),
+        (0x0341, WideLen, wide_len, "wide.len", [WideSrc] -> I32, 8, "LEN: code units before the terminator."),
+        (0x0342, WideLeft, wide_left, "wide.left", [WideDst WideSrc I32] -> Nothing, 8, "As string.left, on code units."),
+        (0x0343, WideRight, wide_right, "wide.right", [WideDst WideSrc I32] -> Nothing, 8, "As string.right, on code units."),
+        (0x0344, WideMid, wide_mid, "wide.mid", [WideDst WideSrc I32 I32] -> Nothing, 8, "As string.mid, on code units."),
+        (0x0345, WideConcat, wide_concat, "wide.concat", [WideDst WideSrc WideSrc] -> Nothing, 8, "As string.concat, on code units."),
+        (0x0346, WideInsert, wide_insert, "wide.insert", [WideDst WideSrc WideSrc I32] -> Nothing, 8, "As string.insert, on code units."),
+        (0x0347, WideDelete, wide_delete, "wide.delete", [WideDst WideSrc I32 I32] -> Nothing, 8, "As string.delete, on code units."),
+        (0x0348, WideReplace, wide_replace, "wide.replace", [WideDst WideSrc WideSrc I32 I32] -> Nothing, 8, "As string.replace, on code units."),
+        (0x0349, WideFind, wide_find, "wide.find", [WideSrc WideSrc] -> I32, 8, "As string.find, on code units."),
+        (0x034a, WideCompare, wide_compare, "wide.compare", [WideSrc WideSrc] -> I32, 8, "-1, 0 or 1: order by code units, then by length."),
+        (0x034b, WideFromChar, wide_from_char, "wide.from_char", [WideDst I32] -> Nothing, 8, "The text of one code unit: the low 16 bits, as they are stored; 0 gives the empty string."),
+        (0x034c, WideFromString, wide_from_string, "wide.from_string", [WideDst Src] -> Nothing, 8, "The wide form of a string: each byte is the code unit of that value (Latin-1)."),
     } };
 }
 
@@ -267,7 +282,7 @@ macro_rules! for_each_control {
         (0x000d, RefLoad, ref_load, "ref.load", { storage: Storage }, "ref -> value", [], 1, "Loads the scalar a reference points to."),
         (0x000e, RefStore, ref_store, "ref.store", { storage: Storage }, "ref value ->", [], 1, "Stores the scalar a reference points to."),
         (0x000f, RefField, ref_field, "ref.field", { owner: Type, field: Field }, "ref -> ref", [], 1, "From a structure or function block to one of its fields."),
-        (0x0010, RefIndex, ref_index, "ref.index", { array: Array }, "ref i32… -> ref", [ArrayIndex], 2, "From an array to one element, one index a dimension, each checked against its bounds, first dimension first."),
+        (0x0010, RefIndex, ref_index, "ref.index", { array: Array }, "ref i32… -> ref", [ArrayIndex], 2, "From an array to one element, one index a dimension, each checked against its bounds, first dimension first. A string of capacity n stands for the array 1..n of its bytes (u8) or code units (u16)."),
         (0x0011, RefToInt, ref_to_int, "ref.to_int", {  }, "ref -> i64", [], 1, "The offset from the start of the data region that a reference in memory holds."),
         (0x0012, RefCheck, ref_check, "ref.check", { target: Type, write: Flag }, "i64 -> ref", [Reference], 2, "Makes a reference of an integer: traps if it is NULL or its extent leaves D..%I (for writing: before %I)."),
         (0x0013, Copy, copy, "copy", { target: Type }, "ref ref ->", [], 2, "Copies the whole extent of a type, padding included: destination, source; they may overlap."),

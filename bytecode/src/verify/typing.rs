@@ -10,7 +10,7 @@ use super::rules::Rule;
 use super::scope::{Broken, Scope};
 use super::touch::{Origin, Touch, TouchKind};
 use super::types::Wanted;
-use crate::container::{ControlPlace, Owner, Type};
+use crate::container::{ArrayDescriptor, ControlPlace, Owner, Type};
 use crate::ids::{ArrayId, BlockId, ForId, FunctionId, MethodId, SlotIndex, TypeId};
 use crate::instruction::{ControlOp, HelperOp, HelperOperand, Instruction, MAX_CAPACITIES};
 use crate::limits::MAX_ANALYSIS_ENTRIES;
@@ -397,14 +397,21 @@ impl<'s, 'a, 'c> Typer<'s, 'a, 'c> {
             let capacity = capacities[strings];
             let (found, origin) = self.pop_reference()?;
             match self.scope.types.get(found.target) {
-                Some(Type::String { capacity: own }) if *own == capacity => {}
-                Some(Type::String { capacity: own }) => {
+                Some(own) if operand.string_type(capacity).as_ref() == Some(own) => {}
+                Some(Type::String { capacity: own }) if !operand.is_wide() => {
                     let message = format!("it says STRING[{capacity}]; the stack has a STRING[{own}]");
                     return Err((Rule::StringOperand, message));
                 }
-                _ => return Err((Rule::ReferenceTarget, format!("it takes a string; the stack has {found}"))),
+                Some(Type::WideString { capacity: own }) if operand.is_wide() => {
+                    let message = format!("it says WSTRING[{capacity}]; the stack has a WSTRING[{own}]");
+                    return Err((Rule::StringOperand, message));
+                }
+                _ => {
+                    let wanted = if operand.is_wide() { "WSTRING" } else { "STRING" };
+                    return Err((Rule::ReferenceTarget, format!("it takes a {wanted}; the stack has {found}")));
+                }
             }
-            if *operand == HelperOperand::Dst {
+            if operand.is_destination() {
                 if !found.write {
                     return Err((Rule::ReadOnlyReference, format!("the stack has {found}")));
                 }
@@ -512,11 +519,24 @@ impl<'s, 'a, 'c> Typer<'s, 'a, 'c> {
             self.pop_value(ValueType::I32)?;
         }
         let (found, origin) = self.pop_reference()?;
-        if self.scope.types.get(found.target) != Some(&Type::Array(array)) {
+        if self.scope.types.get(found.target) != Some(&Type::Array(array))
+            && !self.are_characters(descriptor, found.target)
+        {
             return Err((Rule::ReferenceTarget, format!("it works on array {array}; the stack has {found}")));
         }
         // Any element: the origin stays the whole array.
         self.push_entry(Entry { ty: StackType::Ref(RefType { target: descriptor.element, ..found }), origin })
+    }
+
+    /// Whether an array is the bytes or code units of a string of this type, so that it can stand for the string.
+    fn are_characters(&self, array: &ArrayDescriptor, string: TypeId) -> bool {
+        let (unit, capacity) = match self.scope.types.get(string) {
+            Some(Type::String { capacity }) => (Storage::U8, *capacity),
+            Some(Type::WideString { capacity }) => (Storage::U16, *capacity),
+            _ => return false,
+        };
+        array.dimensions == [(1, i32::from(capacity))]
+            && self.scope.types.get(array.element) == Some(&Type::Scalar(unit))
     }
 
     fn for_loop(&mut self, id: ForId, enters: bool) -> Result<(), Broken> {

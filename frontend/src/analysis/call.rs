@@ -376,6 +376,7 @@ impl<'a> Checker<'_, 'a> {
         };
         let ty = match &value {
             Const::Str(text) => Ty::Str(u16::try_from(text.len().max(1)).unwrap_or(u16::MAX)),
+            Const::WStr(text) => Ty::WStr(u16::try_from(text.len().max(1)).unwrap_or(u16::MAX)),
             _ => var.ty,
         };
         Some(Expr { kind: ExprKind::Const(value), ty, span })

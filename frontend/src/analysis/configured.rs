@@ -463,7 +463,7 @@ fn key(place: &Place) -> String {
                     }
                 }
             }
-            Step::Part(..) => {}
+            Step::Part(..) | Step::Character(..) => {}
         }
     }
     text

@@ -6,7 +6,8 @@ use super::expr::Checker;
 use super::fold;
 use super::tree::{BinOp, Expr, ExprKind};
 use super::types::{
-    Const, Ty, TyKind, integer_type, is_bits, is_integer, is_real, is_signed, is_time, limits, long_form, widen, wrap,
+    Const, Ty, TyKind, integer_type, is_bits, is_character, is_integer, is_real, is_signed, is_time, limits, long_form,
+    widen, wrap,
 };
 use crate::diagnostics::{Rule, types as rules};
 use crate::source::Span;
@@ -148,9 +149,13 @@ impl Checker<'_, '_> {
         }
         match (expr.ty, to) {
             (Ty::IntLit | Ty::RealLit, Ty::Elem(elementary)) => return self.literal(&expr, elementary),
-            (Ty::Str(_), Ty::Str(_)) => return expr,
+            (Ty::Str(_), Ty::Str(_)) | (Ty::WStr(_), Ty::WStr(_)) => return expr,
             _ => {}
         }
+        let expr = match self.coerce_character(expr, to) {
+            Ok(found) => return found,
+            Err(expr) => *expr,
+        };
         let from_enum = match self.an.types.kind(expr.ty) {
             Some(TyKind::Enum { has_base, .. }) => Some(*has_base),
             _ => None,
@@ -255,7 +260,9 @@ impl Checker<'_, '_> {
                 let (wide, narrow) = (*value as f64, *value as f32);
                 if to == E::Real { Const::F32(narrow) } else { Const::F64(wide) }
             }
-            ExprKind::Const(Const::Wide(value)) if to != E::Bool && !is_time(to) && integer_type(to).is_some() => {
+            ExprKind::Const(Const::Wide(value))
+                if to != E::Bool && !is_time(to) && integer_type(to).is_some() && !is_character(to) =>
+            {
                 let (low, high) = limits(to).unwrap_or((0, 0));
                 if *value < low || *value > high {
                     let message = format!("{value} does not fit {}, which holds {low}..{high}", to.name());
@@ -322,8 +329,14 @@ impl Checker<'_, '_> {
             let ty = self.an.types.without_range(a.ty);
             return Some((Expr { ty, ..a }, Expr { ty, ..b }, ty));
         }
-        if let (Ty::Str(n), Ty::Str(m)) = (a.ty, b.ty) {
-            return Some((a, b, Ty::Str(n.max(m))));
+        let (a, b) = self.meet_characters(a, b);
+        if let (Some(n), Some(m)) = (a.ty.capacity(), b.ty.capacity()) {
+            let wide = a.ty.is_wide_text();
+            return (wide == b.ty.is_wide_text()).then(|| (a, b, Ty::text(wide, n.max(m))));
+        }
+        if a.ty == b.ty && self.an.types.elementary(a.ty).is_some_and(is_character) {
+            let ty = a.ty;
+            return Some((a, b, ty));
         }
         let (a, b) = match (is_literal(a.ty), is_literal(b.ty)) {
             (true, true) => return Self::unify_literals(a, b),

@@ -5,7 +5,9 @@ use khz_machine::library::functions::{self, FunctionRow, StandardFunction as F, 
 
 use super::expr::{Checker, broken};
 use super::tree::{Enabled, Expr, ExprKind};
-use super::types::{DEFAULT_STRING_LENGTH, Ty, elementary_by_name, is_bits, is_duration, is_integer, is_real};
+use super::types::{
+    DEFAULT_STRING_LENGTH, Ty, elementary_by_name, is_bits, is_character, is_duration, is_integer, is_real,
+};
 use crate::source::Span;
 use crate::syntax::ast::{self, Arg, ArgKind};
 
@@ -29,10 +31,15 @@ pub(super) fn has_member(class: TypeClass, ty: E) -> bool {
         TypeClass::AnyInt | TypeClass::Count | TypeClass::Shiftable => is_integer(ty) || is_bits(ty),
         TypeClass::AnyBit => ty == E::Bool || is_bits(ty) || is_integer(ty),
         TypeClass::BitString => is_bits(ty),
-        TypeClass::Bytes => !is_real(ty),
+        TypeClass::Bytes => !is_real(ty) && !is_character(ty),
         TypeClass::Bool => ty == E::Bool,
-        TypeClass::AnyString | TypeClass::Array => false,
+        TypeClass::AnyString | TypeClass::AnyChars | TypeClass::Array => false,
     }
+}
+
+/// Whether a parameter takes strings.
+fn takes_text(class: TypeClass) -> bool {
+    matches!(class, TypeClass::AnyElementary | TypeClass::AnyString | TypeClass::AnyChars)
 }
 
 impl<'a> Checker<'_, 'a> {
@@ -81,10 +88,10 @@ impl<'a> Checker<'_, 'a> {
     pub(super) fn typed_function(&self, text: &str) -> Option<(&'static FunctionRow, Ty)> {
         let (row, name) = functions::typed(text)?;
         let class = row.parameters.iter().map(|parameter| parameter.class);
-        let takes_text = |class: TypeClass| matches!(class, TypeClass::AnyElementary | TypeClass::AnyString);
-        if name == "STRING" {
+        if let "STRING" | "WSTRING" = name {
             let mut class = class;
-            return class.any(takes_text).then_some((row, Ty::Str(DEFAULT_STRING_LENGTH)));
+            let ty = Ty::text(name == "WSTRING", DEFAULT_STRING_LENGTH);
+            return class.any(takes_text).then_some((row, ty));
         }
         let ty = elementary_by_name(name)?;
         let generic = class.filter(|class| class.is_generic()).collect::<Vec<_>>();
@@ -100,7 +107,7 @@ impl<'a> Checker<'_, 'a> {
             // MUL_TIME and DIV_TIME take a number there (table 35).
             Some(Ty::Elem(ty)) if is_duration(ty) && at > 0 && matches!(row.function, F::Mul | F::Div) => found,
             Some(ty @ Ty::Elem(_)) if class(at) == first => self.coerce(found, ty),
-            Some(ty @ Ty::Str(_)) if class(at).is_some_and(TypeClass::is_generic) => self.coerce(found, ty),
+            Some(ty) if ty.is_text() && class(at).is_some_and(takes_text) => self.coerce(found, ty),
             _ => found,
         }
     }

@@ -117,7 +117,10 @@ impl<'c, 'a> Checker<'c, 'a> {
     pub(super) fn expr(&mut self, expr: &'a ast::Expr, want: Ty) -> Expr {
         let span = expr.span;
         match &expr.kind {
-            ast::ExprKind::Literal(literal) => self.literal_expr(literal, span),
+            ast::ExprKind::Literal(literal) => {
+                let found = self.literal_expr(literal, span);
+                self.as_character(found, want)
+            }
             ast::ExprKind::EnumValue { ty, value } => self.enum_value(ty, value, span),
             ast::ExprKind::Name(name) => self.name(expr, name, want),
             ast::ExprKind::Member { base, member } if self.list_of(base).is_some() => {
@@ -149,20 +152,14 @@ impl<'c, 'a> Checker<'c, 'a> {
             LiteralValue::Time { long, value_ns } => {
                 (Const::Int(*value_ns), Ty::Elem(if *long { E::Ltime } else { E::Time }))
             }
-            LiteralValue::String(text) => {
-                let length = u16::try_from(text.len().max(1)).ok();
-                let Some(length) =
-                    length.filter(|length| u32::from(*length) <= khz_bytecode::limits::MAX_STRING_LENGTH)
-                else {
-                    self.an.report(&rules::STRING_LENGTH, span, "the text is longer than a STRING may be");
-                    return broken(span);
-                };
-                (Const::Str(text.as_slice().into()), Ty::Str(length))
-            }
-            LiteralValue::WString(_) => {
-                self.an.report(&names::NOT_SUPPORTED, span, "WSTRING is not of the language yet");
-                return broken(span);
-            }
+            LiteralValue::String(text) => match self.text_length(text.len(), span) {
+                Some(length) => (Const::Str(text.as_slice().into()), Ty::Str(length)),
+                None => return broken(span),
+            },
+            LiteralValue::WString(units) => match self.text_length(units.len(), span) {
+                Some(length) => (Const::WStr(units.as_slice().into()), Ty::WStr(length)),
+                None => return broken(span),
+            },
             LiteralValue::Date { long, value_ns } => {
                 (Const::Int(*value_ns), Ty::Elem(if *long { E::Ldate } else { E::Date }))
             }
@@ -178,7 +175,7 @@ impl<'c, 'a> Checker<'c, 'a> {
         let (to, _) = self.an.resolve_type_name(prefix);
         match (found.ty, to) {
             (_, Ty::Error) => broken(span),
-            (Ty::IntLit | Ty::RealLit | Ty::Str(_), _) => self.coerce(found, to),
+            (Ty::IntLit | Ty::RealLit | Ty::Str(_) | Ty::WStr(_), _) => self.coerce(found, to),
             _ if found.ty == to => found,
             _ => self.coerce(found, to),
         }
@@ -311,6 +308,7 @@ impl<'c, 'a> Checker<'c, 'a> {
     pub(super) fn zero(&self, ty: Ty) -> Option<Const> {
         match (ty, self.an.types.elementary(ty)) {
             (Ty::Str(_), _) => Some(Const::Str(Rc::new([]))),
+            (Ty::WStr(_), _) => Some(Const::WStr(Rc::new([]))),
             (_, Some(E::Real)) => Some(Const::F32(0.0)),
             (_, Some(E::Lreal)) => Some(Const::F64(0.0)),
             (_, Some(_)) => Some(Const::Int(0)),
@@ -469,7 +467,7 @@ impl<'c, 'a> Checker<'c, 'a> {
         self.warn_bit_arithmetic(op, ty, span);
         let result = if op.is_comparison() { BOOL } else { ty };
         if let (ExprKind::Const(x), ExprKind::Const(y), Some(elementary)) =
-            (&a.kind, &b.kind, self.an.types.elementary(ty).or(matches!(ty, Ty::Str(_)).then_some(E::Byte)))
+            (&a.kind, &b.kind, self.an.types.elementary(ty).or(ty.character()))
         {
             match fold::binary(op, elementary, x, y) {
                 Ok(value) => return Expr { kind: ExprKind::Const(value), ty: result, span },
@@ -521,7 +519,7 @@ impl<'c, 'a> Checker<'c, 'a> {
     fn has_operator(&self, op: BinOp, ty: Ty) -> bool {
         if op.is_comparison() || matches!(op, BinOp::Min | BinOp::Max) {
             let equality = matches!(op, BinOp::Eq | BinOp::Ne);
-            return matches!(ty, Ty::Str(_)) || self.an.types.elementary(ty).is_some() || (equality && ty == Ty::Error);
+            return ty.is_text() || self.an.types.elementary(ty).is_some() || (equality && ty == Ty::Error);
         }
         let Some(elementary) = self.an.types.elementary(ty) else { return false };
         if self.is_enum(ty) {

@@ -74,11 +74,8 @@ pub(super) fn binary(op: BinOp, ty: E, a: &Const, b: &Const) -> Result<Const, Un
             };
             Ok(Const::F64(canonical64(found)))
         }
-        (Const::Str(x), Const::Str(y)) => match op {
-            BinOp::Min => Ok(if y < x { b } else { a }.clone()),
-            BinOp::Max => Ok(if y > x { b } else { a }.clone()),
-            _ => compare(op, Some(x.cmp(y))),
-        },
+        (Const::Str(x), Const::Str(y)) => texts(op, (a, b), x.cmp(y)),
+        (Const::WStr(x), Const::WStr(y)) => texts(op, (a, b), x.cmp(y)),
         _ => Err(Unfolded::Unknown),
     }
 }
@@ -150,6 +147,15 @@ fn integer(op: BinOp, ty: E, a: i128, b: i128) -> Result<Const, Unfolded> {
     Ok(Const::Int(wrap(ty, found)))
 }
 
+/// Two strings, whose order is known.
+fn texts(op: BinOp, (a, b): (&Const, &Const), order: std::cmp::Ordering) -> Result<Const, Unfolded> {
+    match op {
+        BinOp::Min => Ok(if order.is_gt() { b } else { a }.clone()),
+        BinOp::Max => Ok(if order.is_lt() { b } else { a }.clone()),
+        _ => compare(op, Some(order)),
+    }
+}
+
 /// Whether two floats go through a routine of the machine.
 fn is_chosen_or_routine(op: BinOp) -> bool {
     matches!(op, BinOp::Min | BinOp::Max | BinOp::Pow | BinOp::Atan2)
@@ -168,7 +174,7 @@ fn value(known: &Const, ty: E) -> Option<Value> {
         Const::Int(known) => Value::I32(*known as i32),
         Const::F32(known) => Value::F32(*known),
         Const::F64(known) => Value::F64(*known),
-        Const::Wide(_) | Const::Lit(..) | Const::Str(_) => return None,
+        Const::Wide(_) | Const::Lit(..) | Const::Str(_) | Const::WStr(_) => return None,
     })
 }
 
@@ -182,36 +188,53 @@ fn machine(code: NumericOp, operands: &[Value], ty: E) -> Option<Const> {
     })
 }
 
-/// A string operation whose operands are all known.
-pub(super) fn text(op: TextOp, parts: &[Expr]) -> Option<Const> {
-    let helper = ops::text(op)?;
-    // The result, then the operands, each in a string as long as it must be.
-    let length = |part: &Expr| match &part.kind {
-        ExprKind::Const(Const::Str(text)) => text.len(),
+/// A string operation whose operands are all known; `ty` is its result's type.
+pub(super) fn text(op: TextOp, parts: &[Expr], ty: Ty) -> Option<Const> {
+    let wide = if ty.is_text() { ty.is_wide_text() } else { parts.first()?.ty.is_wide_text() };
+    let helper = ops::text(op, wide)?;
+    let operands: Vec<(&Const, Ty)> = parts
+        .iter()
+        .map(|part| match &part.kind {
+            ExprKind::Const(known) => Some((known, part.ty)),
+            _ => None,
+        })
+        .collect::<Option<_>>()?;
+    // The result, then the operands, each in a string as long as it must be; one character may come of a number.
+    let characters = |(known, _): &(&Const, Ty)| match known {
+        Const::Str(text) => text.len(),
+        Const::WStr(text) => text.len(),
         _ => 0,
     };
-    let room = parts.iter().map(length).sum::<usize>();
-    let mut image = vec![0; room + 1];
+    let room = operands.iter().map(characters).sum::<usize>() + 1;
+    let mut image = vec![0; 2 * (room + 1)];
     let mut places = Vec::new();
     if helper.result().is_none() {
         places.push(StringPlace { at: 0, capacity: u16::try_from(room).ok()? });
     }
     let mut values = Vec::new();
-    for part in parts {
-        match (&part.kind, part.ty) {
-            (ExprKind::Const(Const::Str(text)), _) => {
-                let at = u32::try_from(image.len()).ok()?;
-                places.push(StringPlace { at, capacity: u16::try_from(text.len()).ok()? });
-                image.extend_from_slice(text);
-                image.push(0);
-            }
-            (ExprKind::Const(known), Ty::Elem(ty)) => values.push(value(known, ty)?),
-            _ => return None,
+    for operand in &operands {
+        let (known, of) = operand;
+        if of.is_text() {
+            let at = u32::try_from(image.len()).ok()?;
+            places.push(StringPlace { at, capacity: u16::try_from(characters(operand)).ok()? });
+            image.extend(super::init::scalar_bytes(known, 2 * (u32::try_from(characters(operand)).ok()? + 1)));
+        } else {
+            values.push(value(
+                known,
+                match *of {
+                    Ty::Elem(of) => of,
+                    _ => return None,
+                },
+            )?);
         }
     }
     match eval_helper(helper, &mut image, &places, &values) {
         Some(Value::I32(found)) => Some(Const::Int(wrap(E::Int, i128::from(found)))),
         Some(_) => None,
+        None if wide => {
+            let units = image.as_chunks::<2>().0.iter().map(|unit| u16::from_le_bytes(*unit));
+            Some(Const::WStr(units.take_while(|unit| *unit != 0).collect()))
+        }
         None => Some(Const::Str(image.split(|byte| *byte == 0).next()?.into())),
     }
 }
@@ -263,6 +286,10 @@ pub(super) fn convert(value: &Const, from: E, to: E, truncates: bool) -> Option<
     match value {
         Const::Int(value) => {
             let mut number = widen(from, *value);
+            if (from, to) == (E::Wchar, E::Char) {
+                let unit = u16::try_from(number).unwrap_or(u16::MAX);
+                return Some(Const::Int(i64::from(super::characters::narrow(unit))));
+            }
             match (unit_ns(from), unit_ns(to)) {
                 (Some(_), Some(_)) => number = i128::from(convert_ns(*value, from, to)),
                 (Some(unit), None) => number /= i128::from(unit),

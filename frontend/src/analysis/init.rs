@@ -232,6 +232,7 @@ pub(crate) fn scalar_bytes(value: &Const, bytes: u32) -> Vec<u8> {
         Const::F32(value) => value.to_le_bytes().to_vec(),
         Const::F64(value) => value.to_le_bytes().to_vec(),
         Const::Str(text) => text.to_vec(),
+        Const::WStr(text) => text.iter().flat_map(|unit| unit.to_le_bytes()).collect(),
         Const::Wide(_) | Const::Lit(..) => Vec::new(),
     };
     out.resize(bytes as usize, 0);

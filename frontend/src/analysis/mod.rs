@@ -15,6 +15,7 @@ mod union;
 mod bcd;
 mod block_tasks;
 mod call;
+mod characters;
 mod config;
 mod configured;
 mod convert;

@@ -119,19 +119,32 @@ float_table!(float32, Add F32Add, Sub F32Sub, Mul F32Mul, Div F32Div, Pow F32Pow
 float_table!(float64, Add F64Add, Sub F64Sub, Mul F64Mul, Div F64Div, Pow F64Pow, Atan2 F64Atan2, Min F64Min, Max F64Max,
     Eq F64Eq, Ne F64Ne, Lt F64Lt, Le F64Le, Gt F64Gt, Ge F64Ge);
 
-/// A string operation; `None` for conversions, which hang on the type.
-pub(crate) fn text(op: TextOp) -> Option<H> {
-    Some(match op {
-        TextOp::Len => H::StringLen,
-        TextOp::Find => H::StringFind,
-        TextOp::Left => H::StringLeft,
-        TextOp::Right => H::StringRight,
-        TextOp::Mid => H::StringMid,
-        TextOp::Concat => H::StringConcat,
-        TextOp::Insert => H::StringInsert,
-        TextOp::Delete => H::StringDelete,
-        TextOp::Replace => H::StringReplace,
-        TextOp::From | TextOp::To => return None,
+/// A string operation on strings that are wide or not; `None` for what hangs on the type of a value.
+pub(crate) fn text(op: TextOp, wide: bool) -> Option<H> {
+    Some(match (op, wide) {
+        (TextOp::Len, false) => H::StringLen,
+        (TextOp::Len, true) => H::WideLen,
+        (TextOp::Find, false) => H::StringFind,
+        (TextOp::Find, true) => H::WideFind,
+        (TextOp::Left, false) => H::StringLeft,
+        (TextOp::Left, true) => H::WideLeft,
+        (TextOp::Right, false) => H::StringRight,
+        (TextOp::Right, true) => H::WideRight,
+        (TextOp::Mid, false) => H::StringMid,
+        (TextOp::Mid, true) => H::WideMid,
+        (TextOp::Concat, false) => H::StringConcat,
+        (TextOp::Concat, true) => H::WideConcat,
+        (TextOp::Insert, false) => H::StringInsert,
+        (TextOp::Insert, true) => H::WideInsert,
+        (TextOp::Delete, false) => H::StringDelete,
+        (TextOp::Delete, true) => H::WideDelete,
+        (TextOp::Replace, false) => H::StringReplace,
+        (TextOp::Replace, true) => H::WideReplace,
+        (TextOp::FromCharacter, false) => H::StringFromChar,
+        (TextOp::FromCharacter, true) => H::WideFromChar,
+        (TextOp::Narrow, _) => H::StringFromWide,
+        (TextOp::Widen, _) => H::WideFromString,
+        (TextOp::To | TextOp::From | TextOp::First, _) => return None,
     })
 }
 

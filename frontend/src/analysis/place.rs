@@ -296,6 +296,9 @@ impl<'a> Checker<'_, 'a> {
     }
 
     fn element(&mut self, base: Place, indices: &'a [ast::Expr], span: Span) -> Option<Place> {
+        if base.ty.is_text() {
+            return self.character(base, indices, span);
+        }
         // The bounds of an open array are known at its call.
         let kind = match self.an.types.kind(base.ty).cloned() {
             Some(TyKind::Open { element, dims }) => Some((element, vec![(i32::MIN, i32::MAX); dims].into())),
@@ -324,7 +327,7 @@ impl<'a> Checker<'_, 'a> {
         sound.then(|| step(base, Step::Index(owner, list.into()), element, span))
     }
 
-    fn index(&mut self, index: &'a ast::Expr, low: i32, high: i32) -> Option<Expr> {
+    pub(super) fn index(&mut self, index: &'a ast::Expr, low: i32, high: i32) -> Option<Expr> {
         let found = self.expr(index, DINT);
         if found.ty == Ty::Error {
             return None;

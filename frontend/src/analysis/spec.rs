@@ -17,9 +17,6 @@ use crate::source::Span;
 use crate::syntax::ast::{ArrayDim, EnumValue, Expr, Ident, Range, TypeSpec, TypeSpecKind, VarDecl};
 use crate::syntax::symbol::Symbol;
 
-/// Types of the standard that are not of the language yet.
-const LATER: &[&str] = &["WSTRING", "CHAR", "WCHAR"];
-
 impl<'a> Analyzer<'a> {
     /// The type and initial value that a written type stands for. `scope` is the unit whose constants it may use.
     pub(super) fn resolve_spec(&mut self, spec: &'a TypeSpec, scope: Option<PouId>) -> (Ty, Value) {
@@ -29,10 +26,8 @@ impl<'a> Analyzer<'a> {
     fn resolve_spec_inner(&mut self, spec: &'a TypeSpec, scope: Option<PouId>, name: Option<&Ident>) -> (Ty, Value) {
         let ty = match &spec.kind {
             TypeSpecKind::Named(ident) => return self.resolve_type_name(ident),
-            TypeSpecKind::String { wide: true, .. } => self.not_yet(spec.span, "WSTRING"),
-            TypeSpecKind::String { wide: false, length } => {
-                length.as_ref().map_or(Ty::Str(DEFAULT_STRING_LENGTH), |length| self.string_type(length, scope))
-            }
+            TypeSpecKind::String { wide, length: None } => Ty::text(*wide, DEFAULT_STRING_LENGTH),
+            TypeSpecKind::String { wide, length: Some(length) } => self.string_type(*wide, length, scope),
             TypeSpecKind::Subrange { base, range } => self.subrange_type(base, range, scope),
             TypeSpecKind::Enum { base, values } => self.enum_type(base.as_ref(), values, scope, name),
             TypeSpecKind::Array { dims, element } => self.array_type(dims, element, scope, spec.span),
@@ -59,11 +54,8 @@ impl<'a> Analyzer<'a> {
         if let Some(elementary) = elementary_by_name(text) {
             return (Ty::Elem(elementary), Value::Zero);
         }
-        if text == "STRING" {
-            return (Ty::Str(DEFAULT_STRING_LENGTH), Value::Zero);
-        }
-        if LATER.contains(&text) {
-            return (self.not_yet(ident.span, text), Value::Zero);
+        if let "STRING" | "WSTRING" = text {
+            return (Ty::text(text == "WSTRING", DEFAULT_STRING_LENGTH), Value::Zero);
         }
         if self.type_names.contains_key(&ident.symbol) {
             return self.named_type(ident.symbol, ident.span);
@@ -129,10 +121,10 @@ impl<'a> Analyzer<'a> {
         }
     }
 
-    fn string_type(&mut self, length: &'a Expr, scope: Option<PouId>) -> Ty {
+    fn string_type(&mut self, wide: bool, length: &'a Expr, scope: Option<PouId>) -> Ty {
         let Some(value) = self.const_integer(length, scope) else { return Ty::Error };
         match u16::try_from(value) {
-            Ok(value) if value >= 1 && u32::from(value) <= MAX_STRING_LENGTH => Ty::Str(value),
+            Ok(value) if value >= 1 && u32::from(value) <= MAX_STRING_LENGTH => Ty::text(wide, value),
             _ => {
                 let message = format!("the length of a STRING is 1 to {MAX_STRING_LENGTH}, not {value}");
                 self.report(&type_rules::STRING_LENGTH, length.span, message);

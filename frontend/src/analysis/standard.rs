@@ -10,7 +10,7 @@ use super::moments::is_of_moments;
 use super::testing::is_test_word;
 use super::tree::{BinOp, Expr, ExprKind, TextOp, UnOp};
 use super::types::{
-    BOOL, Const, DINT, INT, Ty, TyKind, elementary_by_name, is_integer, is_moment, is_real, widen, wrap,
+    BOOL, Const, DINT, INT, Ty, TyKind, elementary_by_name, is_character, is_integer, is_moment, is_real, widen, wrap,
 };
 use crate::diagnostics::{Diagnostic, semantic as names, types as rules};
 use crate::source::Span;
@@ -197,9 +197,10 @@ impl<'a> Checker<'_, 'a> {
         let elementary = self.an.types.elementary(value.ty);
         let is_enum = self.is_enum(value.ty);
         let fits = match (class, value.ty) {
-            (TypeClass::AnyElementary, Ty::Str(_) | Ty::IntLit | Ty::RealLit) => true,
+            (TypeClass::AnyElementary, ty) if ty.is_text() || matches!(ty, Ty::IntLit | Ty::RealLit) => true,
             (TypeClass::AnyElementary, _) => elementary.is_some(),
-            (TypeClass::AnyString, ty) => matches!(ty, Ty::Str(_)),
+            (TypeClass::AnyString, ty) => ty.is_text(),
+            (TypeClass::AnyChars, ty) => ty.is_text() || elementary.is_some_and(is_character),
             (TypeClass::Bool, ty) => ty == BOOL,
             (TypeClass::Array, ty) => {
                 matches!(self.an.types.kind(ty), Some(TyKind::Array { .. } | TyKind::Open { .. }))
@@ -502,14 +503,13 @@ impl<'a> Checker<'_, 'a> {
     }
 
     fn text_call(&mut self, function: F, values: Vec<Expr>, span: Span) -> Expr {
-        let capacity = |value: &Expr| match value.ty {
-            Ty::Str(length) => u32::from(length),
-            _ => 0,
-        };
+        let Some(values) = self.texts_of_one_width(values) else { return broken(span) };
+        let wide = values.first().is_some_and(|value| value.ty.is_wide_text());
+        let capacity = |value: &Expr| u32::from(value.ty.capacity().unwrap_or(0));
         let sum = values.iter().map(capacity).sum::<u32>().min(khz_bytecode::limits::MAX_STRING_LENGTH);
         let sum = u16::try_from(sum.max(1)).unwrap_or(u16::MAX);
         let first = values.first().map_or(1, capacity);
-        let first = Ty::Str(u16::try_from(first).unwrap_or(u16::MAX));
+        let first = Ty::text(wide, u16::try_from(first).unwrap_or(u16::MAX));
         let (op, ty) = match function {
             F::Len => (TextOp::Len, INT),
             F::Find => (TextOp::Find, INT),
@@ -517,9 +517,9 @@ impl<'a> Checker<'_, 'a> {
             F::Right => (TextOp::Right, first),
             F::Mid => (TextOp::Mid, first),
             F::Delete => (TextOp::Delete, first),
-            F::Insert => (TextOp::Insert, Ty::Str(sum)),
-            F::Replace => (TextOp::Replace, Ty::Str(sum)),
-            _ => (TextOp::Concat, Ty::Str(sum)),
+            F::Insert => (TextOp::Insert, Ty::text(wide, sum)),
+            F::Replace => (TextOp::Replace, Ty::text(wide, sum)),
+            _ => (TextOp::Concat, Ty::text(wide, sum)),
         };
         if op != TextOp::Concat {
             return text(op, values, ty, span);
@@ -530,7 +530,7 @@ impl<'a> Checker<'_, 'a> {
                 None => value,
                 Some(before) => {
                     let length = (capacity(&before) + capacity(&value)).min(khz_bytecode::limits::MAX_STRING_LENGTH);
-                    let ty = Ty::Str(u16::try_from(length).unwrap_or(u16::MAX));
+                    let ty = Ty::text(wide, u16::try_from(length).unwrap_or(u16::MAX));
                     text(TextOp::Concat, vec![before, value], ty, span)
                 }
             });
@@ -552,22 +552,22 @@ impl<'a> Checker<'_, 'a> {
             return Some(broken(span));
         };
         let value = match from {
-            Some(Ty::Str(_)) => self.expr(value, Ty::Void),
+            Some(from) if from.is_text() => self.expr_of(value, from),
             Some(from) => self.expr_of(value, from),
             None => {
                 let found = self.expr(value, Ty::Void);
                 self.settle(found, Ty::Void)
             }
         };
-        Some(self.conversion(value, from, to, shape.truncates, span))
+        Some(self.conversion(value, to, shape.truncates, span))
     }
 
     fn conversion_type(&mut self, name: &str, span: Span) -> Option<Ty> {
         if let Some(elementary) = elementary_by_name(name) {
             return Some(Ty::Elem(elementary));
         }
-        if name == "STRING" {
-            return Some(Ty::Str(super::types::DEFAULT_STRING_LENGTH));
+        if let "STRING" | "WSTRING" = name {
+            return Some(Ty::text(name == "WSTRING", super::types::DEFAULT_STRING_LENGTH));
         }
         let symbol = self.an.ast.names.lookup_folded(name)?;
         if !self.an.type_names.contains_key(&symbol) {
@@ -577,43 +577,25 @@ impl<'a> Checker<'_, 'a> {
         self.an.types.elementary(ty).map(|_| ty)
     }
 
-    fn conversion(&mut self, value: Expr, from: Option<Ty>, to: Ty, truncates: bool, span: Span) -> Expr {
+    fn conversion(&mut self, value: Expr, to: Ty, truncates: bool, span: Span) -> Expr {
         if value.ty == Ty::Error {
             return broken(span);
         }
-        let is_text = matches!(value.ty, Ty::Str(_));
-        if matches!(from, Some(Ty::Str(_))) && !is_text {
-            let message = format!("a STRING is wanted here, not {}", self.an.types.name(value.ty));
-            self.an.report(&rules::MISMATCH, value.span, message);
-            return broken(span);
-        }
-        match (is_text, to) {
-            (true, Ty::Str(_)) => value,
-            (true, _) => {
-                let base = self.an.types.elementary(to);
-                let kind = ExprKind::Text(TextOp::To, vec![value]);
-                let found = Expr { kind, ty: base.map_or(to, Ty::Elem), span };
+        let value = match self.text_conversion(value, to, span) {
+            Ok(found) => return self.retype(found, to),
+            Err(value) => *value,
+        };
+        match (self.an.types.elementary(value.ty), self.an.types.elementary(to)) {
+            (Some(base), Some(target)) => {
+                let found = self.convert(Expr { ty: Ty::Elem(base), ..value }, target, truncates);
+                let found = if base == target { self.itself(found, span) } else { Expr { span, ..found } };
                 self.retype(found, to)
             }
-            (false, Ty::Str(_)) if self.an.types.elementary(value.ty).is_some() => {
-                Expr { kind: ExprKind::Text(TextOp::From, vec![value]), ty: to, span }
+            _ => {
+                let message = format!("{} can not be converted", self.an.types.name(value.ty));
+                self.an.report(&rules::MISMATCH, value.span, message);
+                broken(span)
             }
-            (false, _) => match (self.an.types.elementary(value.ty), self.an.types.elementary(to)) {
-                (Some(_), Some(target)) => {
-                    let ty = match self.an.types.elementary(value.ty) {
-                        Some(base) => Ty::Elem(base),
-                        None => value.ty,
-                    };
-                    let found = self.convert(Expr { ty, ..value }, target, truncates);
-                    let found = if ty == Ty::Elem(target) { self.itself(found, span) } else { Expr { span, ..found } };
-                    self.retype(found, to)
-                }
-                _ => {
-                    let message = format!("{} can not be converted", self.an.types.name(value.ty));
-                    self.an.report(&rules::MISMATCH, value.span, message);
-                    broken(span)
-                }
-            },
         }
     }
 
@@ -647,8 +629,8 @@ fn chosen(function: F, selector: &Expr, values: &[Expr]) -> Option<Const> {
 }
 
 /// An operation on strings, computed when all is known.
-fn text(op: TextOp, values: Vec<Expr>, ty: Ty, span: Span) -> Expr {
-    match fold::text(op, &values) {
+pub(super) fn text(op: TextOp, values: Vec<Expr>, ty: Ty, span: Span) -> Expr {
+    match fold::text(op, &values, ty) {
         Some(known) => Expr { kind: ExprKind::Const(known), ty, span },
         None => Expr { kind: ExprKind::Text(op, values), ty, span },
     }

@@ -438,6 +438,8 @@ pub enum Step {
     Field(TyId, u32),
     /// An element, of the array type given; one DINT index a dimension.
     Index(TyId, Rc<[Expr]>),
+    /// A character of a string of the type given; a DINT index from 1. Always the last step.
+    Character(Ty, Rc<Expr>),
     /// Bits of a bit string or integer: first bit and their number. Always the last step.
     Part(Ty, u32, u32),
 }
@@ -633,6 +635,14 @@ pub enum TextOp {
     From,
     /// To an elementary value.
     To,
+    /// A string of one character.
+    FromCharacter,
+    /// The first character, 0 of an empty string.
+    First,
+    /// STRING to WSTRING.
+    Widen,
+    /// WSTRING to STRING.
+    Narrow,
 }
 
 /// A call of a function or function block.

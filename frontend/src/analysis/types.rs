@@ -27,8 +27,40 @@ pub enum Ty {
     Elem(ElementaryType),
     /// `STRING[n]`.
     Str(u16),
+    /// `WSTRING[n]`.
+    WStr(u16),
     /// A defined type.
     User(TyId),
+}
+
+impl Ty {
+    /// Characters that a STRING or WSTRING of the type holds; `None` for other types.
+    pub fn capacity(self) -> Option<u16> {
+        match self {
+            Ty::Str(capacity) | Ty::WStr(capacity) => Some(capacity),
+            _ => None,
+        }
+    }
+
+    /// Whether it is a STRING or WSTRING.
+    pub fn is_text(self) -> bool {
+        self.capacity().is_some()
+    }
+
+    /// Whether it is a WSTRING.
+    pub fn is_wide_text(self) -> bool {
+        matches!(self, Ty::WStr(_))
+    }
+
+    /// A STRING or WSTRING of a capacity.
+    pub fn text(wide: bool, capacity: u16) -> Ty {
+        if wide { Ty::WStr(capacity) } else { Ty::Str(capacity) }
+    }
+
+    /// The type of a STRING's or WSTRING's characters.
+    pub fn character(self) -> Option<ElementaryType> {
+        self.is_text().then_some(if self.is_wide_text() { ElementaryType::Wchar } else { ElementaryType::Char })
+    }
 }
 
 /// Position in [`TypeTable::defs`].
@@ -47,7 +79,7 @@ pub const DEFAULT_STRING_LENGTH: u16 = 80;
 /// A constant.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Const {
-    /// Of a BOOL, integer, bit string, duration or enumeration: extended to 64 bits as its type says (ULINT, LWORD: the bits).
+    /// Of a BOOL, integer, bit string, character, duration or enumeration: extended to 64 bits as its type says (ULINT, LWORD: the bits).
     Int(i64),
     /// Of an integer literal without a type.
     Wide(i128),
@@ -59,6 +91,8 @@ pub enum Const {
     Lit(f64, f32),
     /// Of a STRING.
     Str(Rc<[u8]>),
+    /// Of a WSTRING: UTF-16 code units.
+    WStr(Rc<[u16]>),
 }
 
 /// An initial value.
@@ -83,6 +117,7 @@ impl Value {
             Value::Scalar(Const::F32(value)) => value.to_bits() == 0,
             Value::Scalar(Const::F64(value)) => value.to_bits() == 0,
             Value::Scalar(Const::Str(bytes)) => bytes.is_empty(),
+            Value::Scalar(Const::WStr(units)) => units.is_empty(),
             Value::Scalar(_) => false,
             Value::Array(runs) => runs.iter().all(|(_, value)| value.is_zero()),
             Value::Record(fields) => fields.iter().all(|(_, value)| value.is_zero()),
@@ -266,6 +301,7 @@ impl TypeTable {
             Ty::RealLit => "a floating-point literal".to_owned(),
             Ty::Elem(elementary) => elementary.name().to_owned(),
             Ty::Str(length) => format!("STRING[{length}]"),
+            Ty::WStr(length) => format!("WSTRING[{length}]"),
             Ty::User(id) => self.def(id).name.clone(),
         }
     }
@@ -275,6 +311,7 @@ impl TypeTable {
         match ty {
             Ty::Elem(elementary) => (elementary.storage().bytes(), elementary.storage().bytes()),
             Ty::Str(length) => (u32::from(length) + 1, 1),
+            Ty::WStr(length) => (2 * (u32::from(length) + 1), 2),
             Ty::User(id) => (self.def(id).size, self.def(id).align),
             _ => (1, 1),
         }
@@ -409,6 +446,11 @@ pub fn is_bits(ty: ElementaryType) -> bool {
     matches!(ty, E::Byte | E::Word | E::Dword | E::Lword)
 }
 
+/// Whether it is CHAR or WCHAR.
+pub fn is_character(ty: ElementaryType) -> bool {
+    matches!(ty, ElementaryType::Char | ElementaryType::Wchar)
+}
+
 /// Whether it is REAL or LREAL.
 pub fn is_real(ty: ElementaryType) -> bool {
     matches!(ty, ElementaryType::Real | ElementaryType::Lreal)
@@ -456,14 +498,14 @@ pub fn long_form(ty: ElementaryType) -> Option<ElementaryType> {
     })
 }
 
-/// Width and sign of what is held in an integer register: integers, bit strings, BOOL, durations, dates and times of day.
+/// Width and sign of what is held in an integer register: integers, bit strings, BOOL, characters, durations, dates and times of day.
 pub fn integer_type(ty: ElementaryType) -> Option<IntegerType> {
     use ElementaryType as E;
     Some(match ty {
-        E::Bool | E::Usint | E::Byte => IntegerType::U8,
+        E::Bool | E::Usint | E::Byte | E::Char => IntegerType::U8,
         E::Sint => IntegerType::I8,
         E::Int => IntegerType::I16,
-        E::Uint | E::Word => IntegerType::U16,
+        E::Uint | E::Word | E::Wchar => IntegerType::U16,
         E::Dint => IntegerType::I32,
         E::Udint | E::Dword => IntegerType::U32,
         E::Lint => IntegerType::I64,
@@ -508,7 +550,7 @@ pub fn wrap(ty: ElementaryType, value: i128) -> i64 {
     }
 }
 
-/// The elementary type of a keyword, in upper case. Wide characters are not of the language yet.
+/// The elementary type of a keyword, in upper case.
 pub fn elementary_by_name(name: &str) -> Option<ElementaryType> {
     use ElementaryType as E;
     let long = match name {
@@ -519,5 +561,5 @@ pub fn elementary_by_name(name: &str) -> Option<ElementaryType> {
         _ => None,
     };
     let short = || ElementaryType::ALL.iter().copied().find(|ty| ty.name() == name);
-    long.or_else(short).filter(|ty| *ty as u8 <= E::LdateAndTime as u8)
+    long.or_else(short)
 }

@@ -108,8 +108,8 @@ rules! {
     }
     NOT_SUPPORTED = "S0021" Error "not of the language yet" {
         "The standard has this, and this compiler will; it does not yet."
-        wrong "PROGRAM p\nVAR\n  w : WSTRING;\nEND_VAR\nEND_PROGRAM\n"
-        right "PROGRAM p\nVAR\n  w : STRING;\nEND_VAR\nEND_PROGRAM\n"
+        wrong "PROGRAM p\nVAR\n  r : REF_TO INT;\nEND_VAR\nEND_PROGRAM\n"
+        right "PROGRAM p\nVAR\n  r : INT;\nEND_VAR\nEND_PROGRAM\n"
     }
     CASE_OVERLAP = "S0022" Error "a value selects two arms" {
         "Each value may stand in one arm of a CASE, alone or in a range."

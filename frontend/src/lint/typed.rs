@@ -74,8 +74,10 @@ fn in_call<'a>(call: &'a Call, visit: &mut dyn FnMut(&'a Expr)) {
 
 fn in_place<'a>(place: &'a Place, visit: &mut dyn FnMut(&'a Expr)) {
     for step in &place.path {
-        if let Step::Index(_, indices) = step {
-            indices.iter().for_each(|index| in_expr(index, visit));
+        match step {
+            Step::Index(_, indices) => indices.iter().for_each(|index| in_expr(index, visit)),
+            Step::Character(_, index) => in_expr(index, visit),
+            Step::Field(..) | Step::Part(..) => {}
         }
     }
 }

@@ -207,7 +207,7 @@ impl<'b, 'p> FunctionBuilder<'b, 'p> {
     fn assign(&mut self, target: &Place, value: &Expr) {
         if self.b.project.types.storage(target.ty).is_some() {
             self.store(target, value);
-        } else if matches!(target.ty, Ty::Str(_)) {
+        } else if target.ty.is_text() {
             self.assign_text(target, value);
         } else {
             self.reference(target);
@@ -338,7 +338,7 @@ impl<'b, 'p> FunctionBuilder<'b, 'p> {
             crate::analysis::tree::Step::Index(_, indices) => {
                 indices.iter().all(|index| matches!(index.kind, ExprKind::Const(Const::Int(_))))
             }
-            crate::analysis::tree::Step::Part(..) => false,
+            crate::analysis::tree::Step::Part(..) | crate::analysis::tree::Step::Character(..) => false,
         });
         let by_reference = match control.root {
             crate::analysis::tree::Root::Var(var) => matches!(self.homes.get(var.0 as usize), Some(Home::Ref(_))),

@@ -49,7 +49,7 @@ impl FunctionBuilder<'_, '_> {
                 self.e.push(I::Const { id }, 0, 1);
             }
             // Literals without a type and strings are no scalars; the checker has given every scalar a type.
-            Const::Wide(_) | Const::Lit(..) | Const::Str(_) => self.i32_const(0),
+            Const::Wide(_) | Const::Lit(..) | Const::Str(_) | Const::WStr(_) => self.i32_const(0),
         }
     }
 
@@ -220,7 +220,7 @@ impl FunctionBuilder<'_, '_> {
                 self.e.bind(end);
                 return;
             }
-            _ if matches!(a.ty, Ty::Str(_)) => {
+            _ if a.ty.is_text() => {
                 self.text_compare(op, a, b);
                 return;
             }
@@ -331,6 +331,10 @@ impl FunctionBuilder<'_, '_> {
     }
 
     fn convert_integer(&mut self, mut from: E, to: E) {
+        if (from, to) == (E::Wchar, E::Char) {
+            self.narrow_character();
+            return;
+        }
         if planted(Fault::Frontend) && from == E::Usint && to.storage().bytes() > 1 {
             self.numeric(N::I32Extend8S);
             from = E::Sint;
@@ -389,13 +393,14 @@ impl FunctionBuilder<'_, '_> {
         use khz_bytecode::instruction::HelperOp as H;
         match op {
             TextOp::Len => {
-                self.text_helper(H::StringLen, parts, None);
+                self.text_helper(if super::text::is_wide(parts) { H::WideLen } else { H::StringLen }, parts, None);
                 self.wrap(ty);
             }
             TextOp::Find => {
-                self.text_helper(H::StringFind, parts, None);
+                self.text_helper(if super::text::is_wide(parts) { H::WideFind } else { H::StringFind }, parts, None);
                 self.wrap(ty);
             }
+            TextOp::First => self.first_character(parts, ty),
             _ => {
                 let (helper, made) = match ty {
                     E::Bool => (H::StringToBool, E::Bool),

@@ -49,6 +49,7 @@ impl Builder<'_> {
                 self.longest_string = self.longest_string.max(capacity);
                 self.add_type(Type::String { capacity })
             }
+            (Ty::WStr(capacity), _) => self.add_type(Type::WideString { capacity }),
             (_, Some(TyKind::Array { element, dims })) => {
                 let element_id = self.type_id(*element);
                 let stride = project.types.extent(*element).0;
@@ -78,6 +79,20 @@ impl Builder<'_> {
         id
     }
 
+    /// The array type that stands for a string's characters.
+    pub(super) fn character_array(&mut self, text: Ty) -> ArrayId {
+        if let Some(&array) = self.characters.get(&text) {
+            return array;
+        }
+        let unit = text.character().unwrap_or(ElementaryType::Char).storage();
+        let element = self.scalar_type(unit);
+        let array = ArrayId(self.id16(self.section.arrays.len(), "array types"));
+        let dimensions = vec![(1, i32::from(text.capacity().unwrap_or(1)))];
+        self.section.arrays.push(ArrayDescriptor { element, stride: unit.bytes(), dimensions });
+        self.characters.insert(text, array);
+        array
+    }
+
     /// A constant of the pool.
     pub(super) fn constant(&mut self, value: Constant) -> ConstantId {
         let key = match value {
@@ -104,11 +119,13 @@ impl Builder<'_> {
                 for (to, from) in out.iter_mut().zip(bytes) {
                     *to = from;
                 }
-                if matches!(value, Const::Str(_))
-                    && let Some(last) = out.last_mut()
-                {
-                    *last = 0;
-                }
+                // What is longer than its place is cut, and ends in a terminator all the same.
+                let terminator = match value {
+                    Const::Str(_) => 1,
+                    Const::WStr(_) => 2,
+                    _ => 0,
+                };
+                out.iter_mut().rev().take(terminator).for_each(|byte| *byte = 0);
             }
             (Value::Array(runs), Some(TyKind::Array { element, .. })) => {
                 let stride = types.extent(*element).0.max(1) as usize;
@@ -169,9 +186,10 @@ impl Builder<'_> {
             _ => {
                 let mut bytes = vec![0; project.types.extent(ty).0 as usize];
                 self.value_bytes(ty, value, &mut bytes);
-                if matches!(ty, Ty::Str(_)) {
+                if ty.is_text() {
+                    let unit = if ty.is_wide_text() { 2 } else { 1 };
                     let used = bytes.iter().rposition(|byte| *byte != 0).map_or(0, |last| last + 1);
-                    bytes.truncate(used.max(1));
+                    bytes.truncate(used.max(1).next_multiple_of(unit));
                 }
                 self.section.init_image.push(InitRun { region, offset, repeat: 1, bytes });
             }
@@ -213,6 +231,7 @@ impl Builder<'_> {
         let project = self.project;
         let made = match (ty, project.types.kind(ty)) {
             (Ty::Str(capacity), _) => DebugType::String { capacity },
+            (Ty::WStr(capacity), _) => DebugType::WideString { capacity },
             (_, Some(TyKind::Enum { base, values, .. })) => DebugType::Enumeration {
                 name: project.types.name(ty),
                 base: *base,

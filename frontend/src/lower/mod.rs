@@ -94,7 +94,9 @@ struct Builder<'p> {
     system: [Option<SlotIndex>; 2],
     image_parameters: BTreeSet<(PouId, VarId)>,
     data_end: u64,
-    literals: BTreeMap<(Vec<u8>, u16), u32>,
+    literals: BTreeMap<(Ty, Vec<u8>), u32>,
+    /// Arrays that stand for the characters of strings.
+    characters: BTreeMap<Ty, ArrayId>,
     constants_in_data: Vec<(Ty, Value, u32)>,
     spilled: BTreeSet<(Option<PouId>, u32)>,
     failure: Option<String>,
@@ -170,6 +172,7 @@ impl<'p> Builder<'p> {
             image_parameters,
             data_end: u64::from(khz_bytecode::limits::NULL_GUARD_BYTES),
             literals: BTreeMap::new(),
+            characters: BTreeMap::new(),
             constants_in_data: Vec::new(),
             spilled: BTreeSet::new(),
             failure: None,
@@ -236,17 +239,18 @@ impl<'p> Builder<'p> {
         offset
     }
 
-    /// The constant variable of a string literal, and its type.
-    fn literal(&mut self, text: &[u8], capacity: u16) -> (u32, Ty) {
-        let ty = Ty::Str(capacity);
-        if let Some(&offset) = self.literals.get(&(text.to_vec(), capacity)) {
-            return (offset, ty);
+    /// The constant variable of a string literal.
+    fn literal(&mut self, text: &Const, ty: Ty) -> u32 {
+        let (size, align) = self.project.types.extent(ty);
+        let key = (ty, crate::analysis::scalar_bytes(text, size));
+        if let Some(&offset) = self.literals.get(&key) {
+            return offset;
         }
         let id = self.type_id(ty);
-        let offset = self.data_room(id, u32::from(capacity) + 1, 1, true);
-        self.literals.insert((text.to_vec(), capacity), offset);
-        self.constants_in_data.push((ty, Value::Scalar(Const::Str(text.into())), offset));
-        (offset, ty)
+        let offset = self.data_room(id, size, align, true);
+        self.literals.insert(key, offset);
+        self.constants_in_data.push((ty, Value::Scalar(text.clone()), offset));
+        offset
     }
 
     /// A constant variable with a value: what fresh variables are copied from.

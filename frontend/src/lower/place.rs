@@ -54,7 +54,7 @@ impl FunctionBuilder<'_, '_> {
     fn root_type(&self, place: &Place) -> Ty {
         self.b.actual(match place.path.first() {
             Some(Step::Field(owner, _) | Step::Index(owner, _)) => Ty::User(*owner),
-            Some(Step::Part(ty, ..)) => *ty,
+            Some(Step::Part(ty, ..) | Step::Character(ty, _)) => *ty,
             None => place.ty,
         })
     }
@@ -122,6 +122,15 @@ impl FunctionBuilder<'_, '_> {
                     if let Some(TyKind::Array { element, .. }) = self.b.project.types.kind(array) {
                         ty = *element;
                     }
+                }
+                Step::Character(text, index) => {
+                    if let Some((bytes, offset)) = at.take() {
+                        self.push_address(bytes, offset, *text);
+                    }
+                    self.value(index);
+                    let array = self.b.character_array(*text);
+                    self.e.mark(place.span);
+                    self.e.push(I::RefIndex { array }, 2, 1);
                 }
                 Step::Part(..) => {}
             }

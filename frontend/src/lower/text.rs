@@ -2,6 +2,7 @@
 
 use khz_bytecode::instruction::{HelperOp as H, Instruction as I, MAX_CAPACITIES, NumericOp as N};
 use khz_bytecode::value::{BytePlace, SlotPlace, Storage};
+use khz_machine::semantics::strings::NO_LATIN_1;
 
 use super::body::{FunctionBuilder, Kept};
 use crate::analysis::ops;
@@ -10,10 +11,12 @@ use crate::analysis::types::{Const, Ty, is_date, is_date_and_time, is_duration, 
 use khz_bytecode::container::ElementaryType as E;
 
 fn capacity(ty: Ty) -> u16 {
-    match ty {
-        Ty::Str(capacity) => capacity,
-        _ => 0,
-    }
+    ty.capacity().unwrap_or(0)
+}
+
+/// Whether the strings that an operation without a string as its result reads are wide.
+pub(super) fn is_wide(parts: &[Expr]) -> bool {
+    parts.first().is_some_and(|part| part.ty.is_wide_text())
 }
 
 impl FunctionBuilder<'_, '_> {
@@ -21,9 +24,9 @@ impl FunctionBuilder<'_, '_> {
     pub(super) fn composed(&mut self, expr: &Expr) {
         match &expr.kind {
             ExprKind::Load(place) => self.reference(place),
-            ExprKind::Const(Const::Str(text)) => {
-                let (offset, ty) = self.b.literal(text, capacity(expr.ty));
-                self.push_address(BytePlace::Data, offset, ty);
+            ExprKind::Const(text @ (Const::Str(_) | Const::WStr(_))) => {
+                let offset = self.b.literal(text, expr.ty);
+                self.push_address(BytePlace::Data, offset, expr.ty);
             }
             ExprKind::Call(call) => self.call_value(call, expr.ty),
             ExprKind::Enabled(enabled) => self.enabled_value(enabled, expr),
@@ -83,7 +86,7 @@ impl FunctionBuilder<'_, '_> {
             self.e.push(I::JumpUnless { target: skip }, 1, 0);
             self.push_address(BytePlace::Frame, offset, ty);
             self.push_address(BytePlace::Frame, copy, ty);
-            self.helper(H::StringAssign, &[capacity(ty), capacity(ty)]);
+            self.copy_text(ty, ty);
             self.e.bind(skip);
         }
         self.release(slot);
@@ -100,15 +103,27 @@ impl FunctionBuilder<'_, '_> {
         let keep = self.e.label();
         self.push_address(BytePlace::Frame, second, ty);
         self.push_address(BytePlace::Frame, first, ty);
-        self.helper(H::StringCompare, &[capacity(ty), capacity(ty)]);
+        self.compare_text(ty, ty);
         self.i32_const(0);
         self.numeric(if op == BinOp::Max { N::I32GtS } else { N::I32LtS });
         self.e.push(I::JumpUnless { target: keep }, 1, 0);
         self.push_address(BytePlace::Frame, first, ty);
         self.push_address(BytePlace::Frame, second, ty);
-        self.helper(H::StringAssign, &[capacity(ty), capacity(ty)]);
+        self.copy_text(ty, ty);
         self.e.bind(keep);
         self.push_address(BytePlace::Frame, first, ty);
+    }
+
+    /// Copies the string on the stack into the one below it.
+    fn copy_text(&mut self, to: Ty, from: Ty) {
+        let op = if to.is_wide_text() { H::WideAssign } else { H::StringAssign };
+        self.helper(op, &[capacity(to), capacity(from)]);
+    }
+
+    /// Leaves -1, 0 or 1 for the two strings on the stack.
+    fn compare_text(&mut self, a: Ty, b: Ty) {
+        let op = if a.is_wide_text() { H::WideCompare } else { H::StringCompare };
+        self.helper(op, &[capacity(a), capacity(b)]);
     }
 
     fn helper(&mut self, op: H, capacities: &[u16]) {
@@ -126,9 +141,7 @@ impl FunctionBuilder<'_, '_> {
         let mut capacities: Vec<u16> = destination.into_iter().collect();
         for part in parts {
             self.value(part);
-            if matches!(part.ty, Ty::Str(_)) {
-                capacities.push(capacity(part.ty));
-            }
+            capacities.extend(part.ty.capacity());
         }
         self.helper(op, &capacities);
     }
@@ -136,43 +149,38 @@ impl FunctionBuilder<'_, '_> {
     /// An operation whose result goes to the string on the stack.
     fn text_operation(&mut self, op: TextOp, parts: &[Expr], ty: Ty) {
         let to = Some(capacity(ty));
-        match op {
-            TextOp::From => {
-                let Some(value) = parts.first() else { return };
-                let from = self.elementary(value.ty);
-                self.value(value);
-                let helper = match from {
-                    E::Bool => H::StringFromBool,
-                    E::Real => H::StringFromF32,
-                    E::Lreal => H::StringFromF64,
-                    _ if is_duration(from) => H::StringFromTime,
-                    _ if is_date(from) => H::StringFromDate,
-                    _ if is_time_of_day(from) => H::StringFromTod,
-                    _ if is_date_and_time(from) => H::StringFromDt,
-                    _ if is_signed(from) => {
-                        self.convert(from, E::Lint, false);
-                        H::StringFromI64
-                    }
-                    _ => {
-                        self.convert(from, E::Ulint, false);
-                        H::StringFromU64
-                    }
-                };
-                debug_assert!(!is_real(from) || matches!(helper, H::StringFromF32 | H::StringFromF64));
-                self.helper(helper, &[capacity(ty)]);
+        if let Some(row) = ops::text(op, ty.is_wide_text()) {
+            self.text_helper(row, parts, to);
+            return;
+        }
+        let (TextOp::From, Some(value)) = (op, parts.first()) else { return };
+        let from = self.elementary(value.ty);
+        self.value(value);
+        let helper = match from {
+            E::Bool => H::StringFromBool,
+            E::Real => H::StringFromF32,
+            E::Lreal => H::StringFromF64,
+            _ if is_duration(from) => H::StringFromTime,
+            _ if is_date(from) => H::StringFromDate,
+            _ if is_time_of_day(from) => H::StringFromTod,
+            _ if is_date_and_time(from) => H::StringFromDt,
+            _ if is_signed(from) => {
+                self.convert(from, E::Lint, false);
+                H::StringFromI64
             }
             _ => {
-                if let Some(helper) = ops::text(op) {
-                    self.text_helper(helper, parts, to);
-                }
+                self.convert(from, E::Ulint, false);
+                H::StringFromU64
             }
-        }
+        };
+        debug_assert!(!is_real(from) || matches!(helper, H::StringFromF32 | H::StringFromF64));
+        self.helper(helper, &[capacity(ty)]);
     }
 
     /// Stores a string into the one whose reference is on the stack.
     pub(super) fn assign_text_from(&mut self, value: &Expr, ty: Ty) {
         self.value(value);
-        self.helper(H::StringAssign, &[capacity(ty), capacity(value.ty)]);
+        self.copy_text(ty, value.ty);
     }
 
     /// `target := value` of strings.
@@ -187,11 +195,35 @@ impl FunctionBuilder<'_, '_> {
         }
     }
 
+    /// Leaves the first character of a string: 0, its terminator, of an empty one.
+    pub(super) fn first_character(&mut self, parts: &[Expr], ty: E) {
+        let [text] = parts else { return };
+        self.value(text);
+        self.i32_const(1);
+        let array = self.b.character_array(text.ty);
+        self.e.push(I::RefIndex { array }, 2, 1);
+        self.e.push(I::RefLoad { storage: ty.storage() }, 1, 1);
+    }
+
+    /// Makes a CHAR of the WCHAR on the stack: `?` where Latin-1 has none.
+    pub(super) fn narrow_character(&mut self) {
+        let slot = self.scratch(Storage::I32);
+        let local = SlotPlace::Local;
+        self.e.push(I::SlotStore { place: local, index: slot }, 1, 0);
+        self.e.push(I::SlotLoad { place: local, index: slot }, 0, 1);
+        self.i32_const(i32::from(NO_LATIN_1));
+        self.e.push(I::SlotLoad { place: local, index: slot }, 0, 1);
+        self.i32_const(256);
+        self.numeric(N::I32LtU);
+        self.e.push(I::Select {}, 3, 1);
+        self.release(slot);
+    }
+
     /// Compares strings.
     pub(super) fn text_compare(&mut self, op: BinOp, a: &Expr, b: &Expr) {
         self.value(a);
         self.value(b);
-        self.helper(H::StringCompare, &[capacity(a.ty), capacity(b.ty)]);
+        self.compare_text(a.ty, b.ty);
         self.i32_const(0);
         if let Some(op) = ops::binary(op, E::Dint) {
             self.numeric(op);

@@ -2,7 +2,7 @@
 
 use khz_bytecode::container::Constant;
 use khz_bytecode::ids::FunctionId;
-use khz_bytecode::instruction::{HelperOp, HelperOperand, Instruction as Code, MAX_CAPACITIES, NumericOp};
+use khz_bytecode::instruction::{HelperOp, Instruction as Code, MAX_CAPACITIES, NumericOp};
 use khz_bytecode::value::IntegerType;
 
 use super::{Builder, Entry};
@@ -82,9 +82,7 @@ impl Builder<'_> {
     }
 
     fn helper(&mut self, op: HelperOp, capacities: [u16; MAX_CAPACITIES]) {
-        debug_assert!(
-            op.operands().iter().filter(|o| matches!(o, HelperOperand::Dst | HelperOperand::Src)).count() <= 3
-        );
+        debug_assert!(op.capacity_count() <= MAX_CAPACITIES);
         let values = self.pop_many(op.operands().len());
         let op_code = Op::Helper(op, capacities, values);
         match op.result() {

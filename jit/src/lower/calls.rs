@@ -179,7 +179,7 @@ impl Lowerer<'_, '_> {
                     types.push(clif_value_type(*ty));
                     arguments.push(value);
                 }
-                HelperOperand::Dst | HelperOperand::Src => {
+                _ => {
                     // Offset in the image in the low half, capacity above.
                     let capacity = i64::from(capacities.next().unwrap_or(0)) << 32;
                     let offset = self.builder.ins().isub(value, self.image);

@@ -30,6 +30,8 @@ pub enum TypeClass {
     Shiftable,
     /// Strings.
     AnyString,
+    /// STRING, WSTRING, CHAR, WCHAR.
+    AnyChars,
     /// BOOL.
     Bool,
     /// An integer that is no part of the generic group: a count, a position, a selector.
@@ -53,6 +55,7 @@ impl TypeClass {
             TypeClass::Bool
                 | TypeClass::Count
                 | TypeClass::AnyString
+                | TypeClass::AnyChars
                 | TypeClass::Array
                 | TypeClass::Of(_)
                 | TypeClass::Part
@@ -74,7 +77,8 @@ impl TypeClass {
             TypeClass::Float => "a REAL or LREAL",
             TypeClass::Bytes => "an integer, bit string or duration",
             TypeClass::Shiftable => "a bit string or integer",
-            TypeClass::AnyString => "a STRING",
+            TypeClass::AnyString => "a STRING or WSTRING",
+            TypeClass::AnyChars => "a string or character",
             TypeClass::Bool => "a BOOL",
             TypeClass::Count | TypeClass::Part | TypeClass::FinePart => "an integer",
             TypeClass::Array => "an array",
@@ -201,13 +205,13 @@ functions! {
     (Left "LEFT" ["IN" AnyString, "L" Count] -> String, "The first L characters.", "table 34"),
     (Right "RIGHT" ["IN" AnyString, "L" Count] -> String, "The last L characters.", "table 34"),
     (Mid "MID" ["IN" AnyString, "L" Count, "P" Count] -> String, "L characters from position P.", "table 34"),
-    (Concat "CONCAT" ["IN1" AnyString, "IN2" AnyString] more -> String, "One behind the other.", "table 34"),
-    (Insert "INSERT" ["IN1" AnyString, "IN2" AnyString, "P" Count] -> String, "IN2 put into IN1 after position P.", "table 34"),
+    (Concat "CONCAT" ["IN1" AnyChars, "IN2" AnyChars] more -> String, "One behind the other.", "table 34"),
+    (Insert "INSERT" ["IN1" AnyString, "IN2" AnyChars, "P" Count] -> String, "IN2 put into IN1 after position P.", "table 34"),
     (Delete "DELETE" ["IN" AnyString, "L" Count, "P" Count] -> String, "IN without L characters from position P.", "table 34"),
-    (Replace "REPLACE" ["IN1" AnyString, "IN2" AnyString, "L" Count, "P" Count] -> String, "IN1 with L characters from position P replaced by IN2.", "table 34"),
+    (Replace "REPLACE" ["IN1" AnyString, "IN2" AnyChars, "L" Count, "P" Count] -> String, "IN1 with L characters from position P replaced by IN2.", "table 34"),
     (LowerBound "LOWER_BOUND" ["ARR" Array, "DIM" Count] -> Dint, "The lowest index of dimension DIM, counted from 1.", "table 15"),
     (UpperBound "UPPER_BOUND" ["ARR" Array, "DIM" Count] -> Dint, "The highest index of dimension DIM, counted from 1.", "table 15"),
-    (Find "FIND" ["IN1" AnyString, "IN2" AnyString] -> Int, "Position of IN2 in IN1, 0 if it is not there.", "table 34"),
+    (Find "FIND" ["IN1" AnyString, "IN2" AnyChars] -> Int, "Position of IN2 in IN1, 0 if it is not there.", "table 34"),
     (AddTodTime "ADD_TOD_TIME" ["IN1" Of(TimeOfDay), "IN2" Of(Time)] -> Of(TimeOfDay), "Sum; it may lie outside a day.", "table 35"),
     (AddLtodLtime "ADD_LTOD_LTIME" ["IN1" Of(LtimeOfDay), "IN2" Of(Ltime)] -> Of(LtimeOfDay), "Sum; it may lie outside a day.", "table 35"),
     (AddDtTime "ADD_DT_TIME" ["IN1" Of(DateAndTime), "IN2" Of(Time)] -> Of(DateAndTime), "Sum.", "table 35"),

@@ -11,6 +11,7 @@ mod float;
 mod integer;
 mod memory;
 pub(crate) mod parse;
+mod search;
 pub mod strings;
 mod text;
 mod value;
@@ -82,12 +83,18 @@ macro_rules! helper_result {
         Some($call.into_value())
     };
 }
-/// The next argument of a helper: a place for `Dst` and `Src`, else a value.
+/// The next argument of a helper: a place for a string, else a value.
 macro_rules! take_argument {
     (Dst, $strings:ident, $values:ident) => {
         $strings.next().unwrap_or_default()
     };
     (Src, $strings:ident, $values:ident) => {
+        $strings.next().unwrap_or_default()
+    };
+    (WideDst, $strings:ident, $values:ident) => {
+        $strings.next().unwrap_or_default()
+    };
+    (WideSrc, $strings:ident, $values:ident) => {
         $strings.next().unwrap_or_default()
     };
     ($variant:ident, $strings:ident, $values:ident) => {
@@ -97,7 +104,7 @@ macro_rules! take_argument {
 
 macro_rules! define_eval_helper {
     ($(($code:literal, $variant:ident, $function:ident, $mnemonic:literal, [$($operand:ident)*] -> $result:ident, $cost:literal, $doc:literal)),* $(,)?) => {
-        /// Does one string instruction on the bytes of an image: `places` are its `Dst` and `Src` operands, `values` the others, each in
+        /// Does one string instruction on the bytes of an image: `places` are its strings, `values` the others, each in
         /// operand order. Missing ones count as empty, or as 0.
         pub fn eval_helper(op: HelperOp, memory: &mut [u8], places: &[StringPlace], values: &[Value]) -> Option<Value> {
             let mut places = places.iter().copied();

@@ -189,9 +189,10 @@ impl Body<'_> {
     /// A string instruction with its operands.
     pub fn helper(&mut self, op: HelperOp, depth: usize) {
         let depth = depth.saturating_sub(1);
-        let strings: Vec<(TypeId, u16)> = (self.world.container.types.types.iter().enumerate())
+        let strings: Vec<(TypeId, u16, bool)> = (self.world.container.types.types.iter().enumerate())
             .filter_map(|(at, ty)| match ty {
-                Type::String { capacity } => Some((TypeId(at as u16), *capacity)),
+                Type::String { capacity } => Some((TypeId(at as u16), *capacity, false)),
+                Type::WideString { capacity } => Some((TypeId(at as u16), *capacity, true)),
                 _ => None,
             })
             .collect();
@@ -205,9 +206,10 @@ impl Body<'_> {
                     self.integer(ValueType::I32, number);
                 }
                 HelperOperand::Value(ty) => self.expression(*ty, depth),
-                HelperOperand::Dst | HelperOperand::Src => {
-                    let (ty, capacity) = strings[self.world.random.below(strings.len())];
-                    self.reference(ty, *operand == HelperOperand::Dst, false, depth);
+                string => {
+                    let fitting: Vec<_> = strings.iter().filter(|(.., wide)| *wide == string.is_wide()).collect();
+                    let (ty, capacity, _) = *fitting[self.world.random.below(fitting.len())];
+                    self.reference(ty, string.is_destination(), false, depth);
                     capacities[count] = capacity;
                     count += 1;
                 }

@@ -203,6 +203,20 @@ impl World {
         self.add_descriptor(element, dimensions);
     }
 
+    /// The array that stands for the characters of a string, so that code may go into it.
+    fn add_characters(&mut self, string: usize) {
+        let (unit, capacity) = match self.container.types.types[string] {
+            Type::String { capacity } => (Storage::U8, capacity),
+            Type::WideString { capacity } => (Storage::U16, capacity),
+            _ => return,
+        };
+        if capacity > 0 && self.random.chance(60) {
+            self.add_descriptor(World::scalar(unit), vec![(1, i32::from(capacity))]);
+            let array = ArrayId(self.container.types.arrays.len() as u16 - 1);
+            self.ways[World::scalar(unit).index()].push((TypeId(string as u16), Way::Index(array)));
+        }
+    }
+
     fn add_descriptor(&mut self, element: TypeId, dimensions: Vec<(i32, i32)>) {
         let stride = self.extents[element.index()].size;
         self.container.types.arrays.push(ArrayDescriptor { element, stride, dimensions });
@@ -237,7 +251,13 @@ impl World {
             let capacity = self.random.one_of([0, 1, 2, 3, 7, 10, 16, 33, 80]);
             self.add(Type::String { capacity });
         }
-        self.add(Type::WideString { capacity: 5 });
+        for _ in 0..2 {
+            let capacity = self.random.one_of([0, 1, 2, 5, 7, 16, 33]);
+            self.add(Type::WideString { capacity });
+        }
+        for at in Storage::ALL.len()..self.extents.len() {
+            self.add_characters(at);
+        }
         for _ in 0..self.random.between(1, 2) {
             let (element, bounds) = swept(&mut self.random);
             self.add_descriptor(element, vec![bounds]);
@@ -479,6 +499,12 @@ impl World {
             let bytes = match &self.container.types.types[variable.ty.index()] {
                 Type::Scalar(storage) => self.random.stored(*storage),
                 Type::String { capacity } => text(&mut self.random, usize::from(*capacity)),
+                Type::WideString { capacity } => {
+                    // Bytes beyond Latin-1 now and then: they have no narrow form.
+                    let narrow = text(&mut self.random, usize::from(*capacity));
+                    let high = if self.random.chance(30) { 0x20 } else { 0 };
+                    narrow.iter().flat_map(|byte| [*byte, if *byte == b'b' { high } else { 0 }]).collect()
+                }
                 _ => continue,
             };
             runs.push(InitRun { region: Region::Data, offset: variable.offset, repeat: 1, bytes });

@@ -239,17 +239,23 @@ impl Run<'_> {
         for (operand, item) in op.operands().iter().zip(items) {
             match (operand, item) {
                 (HelperOperand::Value(_), Item::Value(value)) => values.push(value),
-                (HelperOperand::Dst | HelperOperand::Src, Item::Ref(at, ty)) => {
+                (string, Item::Ref(at, ty)) if string.is_string() => {
                     let capacity = capacities[places.len()];
-                    assert_eq!(self.container.types.types[ty.target.index()], Type::String { capacity });
-                    assert!(ty.write || *operand == HelperOperand::Src, "a write through {ty}");
+                    let wanted = match string {
+                        HelperOperand::WideDst | HelperOperand::WideSrc => Type::WideString { capacity },
+                        _ => Type::String { capacity },
+                    };
+                    assert_eq!(self.container.types.types[ty.target.index()], wanted);
+                    assert!(ty.write || !string.is_destination(), "a write through {ty}");
                     places.push(StringPlace { at, capacity });
                 }
                 (operand, item) => panic!("{item:?} where {operand:?} is due"),
             }
         }
-        if let (Some(HelperOperand::Dst), Some(place)) = (op.operands().first(), places.first()) {
-            self.writes(place.at, u32::from(place.capacity) + 1);
+        if let (Some(first), Some(place)) = (op.operands().first(), places.first())
+            && first.is_destination()
+        {
+            self.writes(place.at, first.unit_bytes() * (u32::from(place.capacity) + 1));
         }
         let result = strings::apply(op, self.image, &places, &values);
         result.into_iter().for_each(|value| self.push(value));

@@ -1,22 +1,22 @@
-//! The string rows on copied bytes; numbers, times and dates as text are in [`texts`].
+//! The string rows on copied characters; numbers, times and dates as text are in [`texts`].
 
-use khz_bytecode::instruction::HelperOp;
+use khz_bytecode::instruction::{HelperOp, HelperOperand};
 use khz_machine::semantics::{StringPlace, Value};
 
 use super::texts;
 
-/// Bytes before the terminator, at most as many as the capacity.
-fn text(image: &[u8], place: StringPlace) -> Vec<u8> {
-    let start = place.at as usize;
-    let room = &image[start..start + usize::from(place.capacity)];
-    room.iter().copied().take_while(|byte| *byte != 0).collect()
+/// Characters before the terminator, at most as many as the capacity; `unit` is the bytes of each.
+fn text(image: &[u8], place: StringPlace, unit: usize) -> Vec<u16> {
+    let room = &image[place.at as usize..][..unit * usize::from(place.capacity)];
+    let characters =
+        room.chunks(unit).map(|bytes| bytes.iter().rev().fold(0, |high, byte| high << 8 | u16::from(*byte)));
+    characters.take_while(|character| *character != 0).collect()
 }
 
-fn put(image: &mut [u8], place: StringPlace, text: &[u8]) {
-    let start = place.at as usize;
-    let len = text.len().min(usize::from(place.capacity));
-    image[start..start + len].copy_from_slice(&text[..len]);
-    image[start + len] = 0;
+fn put(image: &mut [u8], place: StringPlace, unit: usize, text: &[u16]) {
+    let kept = &text[..text.len().min(usize::from(place.capacity))];
+    let bytes = kept.iter().chain(&[0]).flat_map(|character| character.to_le_bytes().into_iter().take(unit));
+    image[place.at as usize..].iter_mut().zip(bytes).for_each(|(to, byte)| *to = byte);
 }
 
 /// `count` cut to 0..=`most`.
@@ -29,12 +29,15 @@ fn clamp(count: i64, most: usize) -> usize {
 /// # Panics
 /// When a place lies outside the image.
 pub(super) fn apply(op: HelperOp, image: &mut [u8], places: &[StringPlace], values: &[Value]) -> Option<Value> {
+    use HelperOp as H;
     let number = |at: usize| match values.get(at) {
         Some(Value::I32(value)) => i64::from(*value),
         Some(Value::I64(value)) => *value,
         _ => 0,
     };
-    let contents: Vec<Vec<u8>> = places.iter().map(|place| text(image, *place)).collect();
+    let strings: Vec<HelperOperand> = op.operands().iter().copied().filter(|operand| operand.is_string()).collect();
+    let unit = |at: usize| if strings[at].is_wide() { 2 } else { 1 };
+    let contents: Vec<Vec<u16>> = places.iter().enumerate().map(|(at, place)| text(image, *place, unit(at))).collect();
     // The first source: behind the destination, when there is one.
     let source = contents.get(1).cloned().unwrap_or_default();
     let (before, behind) = {
@@ -46,20 +49,25 @@ pub(super) fn apply(op: HelperOp, image: &mut [u8], places: &[StringPlace], valu
         return Some(value);
     }
     let result = match op {
-        HelperOp::StringAssign => source,
-        HelperOp::StringLeft => source[..clamp(number(0), source.len())].to_vec(),
-        HelperOp::StringRight => source[source.len() - clamp(number(0), source.len())..].to_vec(),
-        HelperOp::StringMid => source[before..behind].to_vec(),
-        HelperOp::StringConcat => [&source[..], &contents[2]].concat(),
-        HelperOp::StringInsert => {
+        H::StringAssign | H::WideAssign | H::WideFromString => source,
+        H::StringFromWide => {
+            source.iter().map(|character| if *character > 255 { u16::from(b'?') } else { *character }).collect()
+        }
+        H::StringLeft | H::WideLeft => source[..clamp(number(0), source.len())].to_vec(),
+        H::StringRight | H::WideRight => source[source.len() - clamp(number(0), source.len())..].to_vec(),
+        H::StringMid | H::WideMid => source[before..behind].to_vec(),
+        H::StringConcat | H::WideConcat => [&source[..], &contents[2]].concat(),
+        H::StringInsert | H::WideInsert => {
             let at = clamp(number(0), source.len());
             [&source[..at], &contents[2], &source[at..]].concat()
         }
-        HelperOp::StringDelete => [&source[..before], &source[behind..]].concat(),
-        HelperOp::StringReplace => [&source[..before], &contents[2], &source[behind..]].concat(),
-        _ => written(op, values[0]).into_bytes(),
+        H::StringDelete | H::WideDelete => [&source[..before], &source[behind..]].concat(),
+        H::StringReplace | H::WideReplace => [&source[..before], &contents[2], &source[behind..]].concat(),
+        H::StringFromChar => Some(number(0) as u16 & 0xFF).into_iter().filter(|byte| *byte != 0).collect(),
+        H::WideFromChar => Some(number(0) as u16).into_iter().filter(|unit| *unit != 0).collect(),
+        _ => written(op, values[0]).encode_utf16().collect(),
     };
-    put(image, places[0], &result);
+    put(image, places[0], unit(0), &result);
     None
 }
 
@@ -89,13 +97,18 @@ fn written(op: HelperOp, value: Value) -> String {
 }
 
 /// What the rows without a destination make of their strings; none: it is a row with one.
-fn read(op: HelperOp, contents: &[Vec<u8>]) -> Option<Value> {
-    let text = &contents[0];
+fn read(op: HelperOp, contents: &[Vec<u16>]) -> Option<Value> {
+    use HelperOp as H;
+    match op {
+        H::StringLen | H::WideLen => return Some(Value::I32(contents[0].len() as i32)),
+        H::StringFind | H::WideFind => return Some(Value::I32(find(&contents[0], &contents[1]))),
+        H::StringCompare | H::WideCompare => return Some(Value::I32(contents[0].cmp(&contents[1]) as i32)),
+        _ => {}
+    }
+    // Conversions read narrow strings only.
+    let text: &[u8] = &contents[0].iter().map(|character| *character as u8).collect::<Vec<u8>>();
     let saturated = |value: i128| Value::I64(value.clamp(i128::from(i64::MIN), i128::from(i64::MAX)) as i64);
     Some(match op {
-        HelperOp::StringLen => Value::I32(text.len() as i32),
-        HelperOp::StringFind => Value::I32(find(text, &contents[1])),
-        HelperOp::StringCompare => Value::I32(text.cmp(&contents[1]) as i32),
         HelperOp::StringToBool => Value::I32(i32::from(text.eq_ignore_ascii_case(b"TRUE"))),
         HelperOp::StringToI64 => saturated(texts::to_integer(text)),
         HelperOp::StringToU64 => Value::I64(texts::to_integer(text).clamp(0, i128::from(u64::MAX)) as u64 as i64),
@@ -115,7 +128,7 @@ fn read(op: HelperOp, contents: &[Vec<u8>]) -> Option<Value> {
     })
 }
 
-fn find(text: &[u8], wanted: &[u8]) -> i32 {
+fn find(text: &[u16], wanted: &[u16]) -> i32 {
     if wanted.is_empty() {
         return 0;
     }

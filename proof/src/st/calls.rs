@@ -110,7 +110,7 @@ impl Generator {
             let input = match row.parameters[at.min(last)].class {
                 TypeClass::Bool => self.expr(Kind::Bool, depth),
                 TypeClass::Count => self.count(i64::from(kind.bits()), depth),
-                TypeClass::AnyString => self.string(depth),
+                TypeClass::AnyString | TypeClass::AnyChars => self.string(depth),
                 // An integer where only floats are taken becomes an LREAL.
                 TypeClass::AnyReal if kind == Kind::Lreal && row.parameters.len() == 1 && self.r.chance(15) => {
                     let from = self.r.one_of(Kind::INTEGERS);

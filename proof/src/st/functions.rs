@@ -29,7 +29,7 @@ pub fn takes(class: TypeClass, kind: Kind) -> bool {
         TypeClass::AnyBit => kind == Kind::Bool || kind.is_integer() || kind.is_bits(),
         TypeClass::Part | TypeClass::FinePart => kind.is_integer(),
         TypeClass::Bool => kind == Kind::Bool,
-        TypeClass::AnyString | TypeClass::Array | TypeClass::Of(_) => false,
+        TypeClass::AnyString | TypeClass::AnyChars | TypeClass::Array | TypeClass::Of(_) => false,
     }
 }
 

@@ -126,7 +126,7 @@ impl<'a> Checker<'_, 'a> {
         if a.ty == Ty::Error || b.ty == Ty::Error {
             return None;
         }
-        let comparable = matches!(a.ty, Ty::Str(_)) || self.an.types.elementary(a.ty).is_some();
+        let comparable = a.ty.is_text() || self.an.types.elementary(a.ty).is_some();
         let by_parts = composed && matches!(op, BinOp::Eq | BinOp::Ne) && !self.an.types.holds_block(x);
         if !comparable && !by_parts {
             return self.no_comparison(word, x, y, span);

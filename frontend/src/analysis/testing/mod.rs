@@ -244,9 +244,12 @@ impl<'a> Checker<'_, 'a> {
     /// The hidden variable of a use and type, and its name.
     fn hidden(&mut self, label: &'static str, ty: Ty, span: Span) -> (Place, String) {
         // Strings of all lengths share a few variables, each long enough.
-        let ty = match ty {
-            Ty::Str(length) => Ty::Str([80, 254, 4095].into_iter().find(|room| length <= *room).unwrap_or(length)),
-            other => other,
+        let ty = match ty.capacity() {
+            Some(length) => {
+                let room = [80, 254, 4095].into_iter().find(|room| length <= *room).unwrap_or(length);
+                Ty::text(ty.is_wide_text(), room)
+            }
+            None => ty,
         };
         let Some(test) = &mut self.test else {
             return (Place { root: Root::CallInstance, path: Vec::new(), ty: Ty::Error, span }, String::new());
@@ -290,8 +293,8 @@ impl<'a> Checker<'_, 'a> {
             if found.ty == Ty::Error {
                 return None;
             }
-            if !matches!(found.ty, Ty::Str(_)) {
-                let text = format!("a message is a STRING, not {}", self.an.types.name(found.ty));
+            if !found.ty.is_text() {
+                let text = format!("a message is a STRING or WSTRING, not {}", self.an.types.name(found.ty));
                 self.an.report(&type_rules::MISMATCH, given.span, text);
                 return None;
             }
