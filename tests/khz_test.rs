@@ -57,7 +57,8 @@ fn a_filter_chooses_tests_and_a_list_runs_none() {
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     assert!(stderr(&output).ends_with("\n4 passed, 0 failed\n"), "{}", stderr(&output));
     let none = samples("--filter nothing-like-it");
-    assert_eq!((none.status.code(), stderr(&none).as_str()), (Some(0), "0 passed, 0 failed\n"));
+    assert_eq!(none.status.code(), Some(2), "a filter that chooses nothing is most likely misspelt");
+    assert_eq!(stderr(&none).lines().last(), Some("no name of the 13 tests holds `nothing-like-it`"));
     let list = samples("--list --filter pump");
     assert_eq!(list.status.code(), Some(0));
     let listed = stdout(&list);

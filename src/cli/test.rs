@@ -22,6 +22,10 @@ pub fn run(args: &TestArgs) -> Outcome {
         print_diagnostics(&suite.diagnostics, &suite.sources, Format::Human);
     }
     let chosen = choose(&suite, args.filter.as_deref());
+    if let Some(filter) = args.filter.as_deref().filter(|_| chosen.is_empty()) {
+        people(&format!("no name of the {} tests holds `{filter}`", suite.tests.len()));
+        return Ok(Status::Usage);
+    }
     if args.list {
         list(args, &chosen);
         return Ok(Status::Done);
