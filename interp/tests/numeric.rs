@@ -1,38 +1,16 @@
 //! Every numeric row over edge values, in every operand shape, against its meaning in `khz_machine::semantics`.
 
 mod common;
+#[path = "../../machine/tests/common/edges.rs"]
+mod edges;
 
 use std::fmt::Write;
 
 use common::load;
+use edges::edges;
 use khz_bytecode::instruction::NumericOp;
-use khz_bytecode::value::ValueType;
 use khz_machine::engine::Engine;
 use khz_machine::semantics::{Value, eval_numeric};
-
-fn edge_values(ty: ValueType) -> Vec<Value> {
-    match ty {
-        ValueType::I32 => [0, 1, -1, 2, 7, 31, 32, 127, 128, -129, 255, 256, 32767, -32769, 65535, i32::MAX, i32::MIN]
-            .map(Value::I32)
-            .to_vec(),
-        ValueType::I64 => [0, 1, -1, 3, 63, 64, 1 << 31, -(1 << 31) - 1, u32::MAX.into(), 1 << 53, i64::MAX, i64::MIN]
-            .map(Value::I64)
-            .to_vec(),
-        ValueType::F32 => {
-            let bits = [0xFFC0_0000, 1, 0x007F_FFFF, 0x7F7F_FFFF];
-            let special = bits.map(f32::from_bits);
-            let plain = [0.0, -0.0, 1.0, -1.5, 0.5, 2.5, 127.5, -128.6, 255.5, 65535.4, 2_147_483_600.0, 1e19, -1e19];
-            let infinite = [f32::INFINITY, f32::NEG_INFINITY];
-            special.into_iter().chain(plain).chain(infinite).map(Value::F32).collect()
-        }
-        ValueType::F64 => {
-            let special = [0xFFF8_0000_0000_0000, 1, 0x7FEF_FFFF_FFFF_FFFF].map(f64::from_bits);
-            let plain = [0.0, -0.0, 1.0, -1.5, 0.5, 2.5, -128.6, 4_294_967_295.5, 2_147_483_647.5, 9.3e18, -1e19, 1e40];
-            let infinite = [f64::INFINITY, f64::NEG_INFINITY];
-            special.into_iter().chain(plain).chain(infinite).map(Value::F64).collect()
-        }
-    }
-}
 
 fn push_constant(text: &mut String, value: Value) {
     let _ = match value {
@@ -47,7 +25,7 @@ fn push_constant(text: &mut String, value: Value) {
 fn operand_lists(op: NumericOp) -> Vec<Vec<Value>> {
     op.operands().iter().fold(vec![Vec::new()], |lists, ty| {
         let longer = |list: &Vec<Value>| {
-            edge_values(*ty).into_iter().map(|value| list.iter().copied().chain([value]).collect()).collect::<Vec<_>>()
+            edges(*ty).into_iter().map(|value| list.iter().copied().chain([value]).collect()).collect::<Vec<_>>()
         };
         lists.iter().flat_map(longer).collect()
     })

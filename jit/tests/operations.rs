@@ -1,40 +1,17 @@
 //! Single operations from the instruction table, over edge values, against their meaning in `khz_machine::semantics`.
 
 mod common;
+#[path = "../../machine/tests/common/edges.rs"]
+mod edges;
 
 use std::fmt::Write;
 
 use common::{load, load_with, slots};
+use edges::edges;
 use khz_bytecode::instruction::{HelperOp, HelperOperand, NumericOp};
 use khz_bytecode::value::{Storage, ValueType};
 use khz_jit::{JitOptions, Passes};
 use khz_machine::semantics::{StringPlace, Value, eval_helper, eval_numeric};
-
-fn edges(ty: ValueType) -> Vec<Value> {
-    match ty {
-        ValueType::I32 => {
-            [0, 1, -1, 2, 7, 8, 31, 32, 33, 127, 128, -129, 255, 256, 32767, -32769, 65535, i32::MAX, i32::MIN]
-                .map(Value::I32)
-                .to_vec()
-        }
-        ValueType::I64 => {
-            [0, 1, -1, 3, 63, 64, 65, 1 << 31, -(1 << 31) - 1, u32::MAX.into(), (1 << 53) + 1, i64::MAX, i64::MIN]
-                .map(Value::I64)
-                .to_vec()
-        }
-        ValueType::F32 => {
-            let bits = [0xFFC0_0000, 1, 0x8000_0001, 0x7F7F_FFFF, 0x7F80_0000, 0xFF80_0000].map(f32::from_bits);
-            let plain = [0.0, -0.0, 1.0, -1.5, 0.5, 2.5, 127.5, -128.6, 255.5, 65535.4, 2_147_483_600.0, 1e19, -1e19];
-            bits.into_iter().chain(plain).map(Value::F32).collect()
-        }
-        ValueType::F64 => {
-            let bits =
-                [0xFFF8_0000_0000_0000, 1, 0x7FEF_FFFF_FFFF_FFFF, 0x7FF0 << 48, 0xFFF0 << 48].map(f64::from_bits);
-            let plain = [0.0, -0.0, 1.0, -1.5, 0.5, 2.5, -128.6, 4_294_967_295.5, 2_147_483_647.5, 9.3e18, -1e19, 1e40];
-            bits.into_iter().chain(plain).map(Value::F64).collect()
-        }
-    }
-}
 
 fn constant(value: Value) -> String {
     match value {

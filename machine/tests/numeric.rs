@@ -1,124 +1,16 @@
 //! Every numeric row, on edge values, against definitions of its own: integers by 128-bit arithmetic, floats by another width or by the
 //! definition of rounding. The model reads the mnemonic, so a row that it does not know fails here.
 
+#[path = "common/edges.rs"]
+mod edges;
+
 use std::hint::black_box;
 
+use edges::all;
 use khz_bytecode::instruction::NumericOp;
 use khz_bytecode::trap::TrapCode;
 use khz_bytecode::value::ValueType;
 use khz_machine::semantics::{NAN_F32_BITS, NAN_F64_BITS, Value, eval_numeric};
-
-const I32_EDGES: &[i32] = &[
-    0,
-    1,
-    -1,
-    2,
-    -2,
-    3,
-    7,
-    8,
-    15,
-    16,
-    31,
-    32,
-    33,
-    63,
-    64,
-    65,
-    127,
-    128,
-    -128,
-    -129,
-    255,
-    256,
-    32_767,
-    32_768,
-    -32_768,
-    65_535,
-    0x5A5A_A5A5,
-    i32::MAX,
-    i32::MIN,
-    i32::MIN + 1,
-    i32::MAX - 1,
-];
-const I64_EDGES: &[i64] = &[
-    0,
-    1,
-    -1,
-    2,
-    -3,
-    10,
-    255,
-    -256,
-    0x7FFF_FFFF,
-    0x8000_0000,
-    0xFFFF_FFFF,
-    0x1_0000_0000,
-    -0x8000_0000,
-    -0x8000_0001,
-    (1 << 53) + 1,
-    (1 << 24) + 1,
-    -(1 << 24) - 1,
-    (1 << 62) + (1 << 38) + 1,
-    i64::MAX,
-    i64::MIN,
-    i64::MIN + 1,
-    i64::MAX - 511,
-];
-const F64_EDGES: &[f64] = &[
-    0.0,
-    -0.0,
-    1.0,
-    -1.0,
-    0.5,
-    -0.5,
-    1.5,
-    2.5,
-    -2.5,
-    0.499_999_999_999_999_94,
-    126.5,
-    127.5,
-    128.5,
-    -128.5,
-    -129.0,
-    254.5,
-    255.5,
-    256.0,
-    32_767.5,
-    65_535.5,
-    2_147_483_647.5,
-    -2_147_483_648.5,
-    2_147_483_648.0,
-    4_294_967_295.5,
-    9.223_372_036_854_775e18,
-    9.223_372_036_854_776e18,
-    -9.3e18,
-    1.844_674_407_370_955_2e19,
-    3.7,
-    -3.7,
-    10.0,
-    1e-310,
-    1e300,
-    -1e300,
-    5e-324,
-    f64::MAX,
-    f64::MIN_POSITIVE,
-    f64::INFINITY,
-    f64::NEG_INFINITY,
-];
-
-fn edges(ty: ValueType) -> Vec<Value> {
-    match ty {
-        ValueType::I32 => I32_EDGES.iter().map(|v| Value::I32(*v)).collect(),
-        ValueType::I64 => I64_EDGES.iter().map(|v| Value::I64(*v)).collect(),
-        ValueType::F32 => {
-            let some = [1e-45_f32, f32::MAX, 1.0e38, 16_777_217.0, 8_388_609.5];
-            let all = F64_EDGES.iter().map(|v| *v as f32).chain(some).map(Value::F32);
-            all.chain([Value::F32(f32::from_bits(NAN_F32_BITS))]).collect()
-        }
-        ValueType::F64 => F64_EDGES.iter().copied().chain([f64::from_bits(NAN_F64_BITS)]).map(Value::F64).collect(),
-    }
-}
 
 fn signed(value: Value) -> i128 {
     match value {
@@ -400,10 +292,10 @@ fn check(op: NumericOp, args: &[Value]) {
 fn every_row_on_edge_values() {
     for op in NumericOp::ALL {
         match op.operands() {
-            [one] => edges(*one).into_iter().for_each(|a| check(*op, &[black_box(a)])),
+            [one] => all(*one).into_iter().for_each(|a| check(*op, &[black_box(a)])),
             [one, two] => {
-                for a in edges(*one) {
-                    edges(*two).into_iter().for_each(|b| check(*op, &black_box([a, b])));
+                for a in all(*one) {
+                    all(*two).into_iter().for_each(|b| check(*op, &black_box([a, b])));
                 }
             }
             other => panic!("{op:?} takes {other:?}"),

@@ -1,7 +1,7 @@
 //! What must come back as it was: a container through its file, through its text, and without its names.
 //!
-//! These need no second opinion: each pair of functions is held against itself. Formatting is held by `tests/round_trips.rs`, because this crate
-//! does not know the front end.
+//! These need no second opinion: each pair of functions is held against itself. Formatting is held by [`harness::round_trips`](crate::harness::round_trips), which
+//! knows the front end.
 
 use std::sync::Arc;
 

@@ -11,6 +11,7 @@ use khz_bytecode::container::{self, Container};
 use khz_bytecode::verify::verify;
 use khz_frontend::diagnostics::has_errors;
 use khz_frontend::format::{FormatOptions, KeywordCase, format};
+use khz_frontend::syntax::lexer::{TokenKind, lex};
 use khz_frontend::{CompileOptions, SourceInput};
 
 const ROUNDS: Rounds = Rounds { count: 4, seed: 7, fuel: 200_000, image_limit_bytes: 1 << 22 };
@@ -52,7 +53,22 @@ pub fn check_container(container: &Container, engines: usize) -> Result<(), Stri
     without_names(&verified, &engines::makers()[..engines], &ROUNDS)
 }
 
-/// Formats a text in several ways: each is its own formatting and compiles to the same content. How many differ from the text; none: it
+/// What formatting may not change: the tokens, comments and pragmas among them, but for the case of words and white space inside of comments. The formatter makes sure
+/// of that itself; this is the second reading.
+fn tokens(text: &str) -> Vec<(TokenKind, String)> {
+    let tokens = lex(text).into_iter().map(|token| {
+        let words = text.get(token.start as usize..token.end as usize).unwrap_or_default();
+        let words = match token.kind {
+            TokenKind::Keyword(_) | TokenKind::Ident => words.to_ascii_uppercase(),
+            TokenKind::Comment | TokenKind::Pragma => words.split_whitespace().collect::<Vec<_>>().join(" "),
+            _ => words.to_string(),
+        };
+        (token.kind, words)
+    });
+    tokens.collect()
+}
+
+/// Formats a text in several ways: each has the same tokens, is its own formatting and compiles to the same content. How many differ from the text; none: it
 /// does not compile.
 ///
 /// # Errors
@@ -70,6 +86,9 @@ pub fn check_format(text: &str) -> Result<Option<usize>, String> {
         let twice = format(&once, options).map_err(|error| format!("{error:?}"))?;
         if once != twice {
             return Err(format!("formatting the formatted text changes it\n{once}\n=====\n{twice}"));
+        }
+        if tokens(&once) != tokens(text) {
+            return Err(format!("the formatted text has other tokens\n{once}"));
         }
         let after = compile(&once).ok_or_else(|| format!("the formatted text is refused\n{once}"))?;
         if content(&after) != content(&before) {

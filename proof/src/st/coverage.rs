@@ -7,8 +7,76 @@ use super::generate::Size;
 use super::tree::{Arg, Base, Class, Def, ExprKind, Kind, Op, Source, Step, Stmt, Ty, UnitKind};
 use super::visit::{Node, each};
 use crate::campaign::Figures;
+use khz_bytecode::trap::TrapCode;
 use khz_machine::library;
 use khz_machine::library::functions::{ResultRule, TABLE};
+
+/// Everything of the language that is no function, block, conversion or operator. A program with one that does not stand here is a panic, and a search of some
+/// size has to reach each of them.
+pub const FEATURES: [&str; 50] = [
+    "=>",
+    "ARRAY",
+    "AT",
+    "CASE",
+    "CONFIGURATION",
+    "CONTINUE",
+    "EN",
+    "ENO",
+    "EXIT",
+    "FOR",
+    "IF",
+    "NOT",
+    "REPEAT",
+    "RETAIN",
+    "RETURN",
+    "SINGLE",
+    "SINGLE and INTERVAL",
+    "STRUCT",
+    "VAR",
+    "VAR CONSTANT",
+    "VAR_INPUT",
+    "VAR_IN_OUT",
+    "VAR_IN_OUT argument",
+    "VAR_OUTPUT",
+    "VAR_TEMP",
+    "WHILE",
+    "WITH",
+    "argument",
+    "array of blocks",
+    "assignment",
+    "assignment of a whole",
+    "bit access",
+    "block call",
+    "composite result",
+    "connection",
+    "direct address",
+    "element",
+    "element of several dimensions",
+    "enumeration",
+    "enumeration with a base",
+    "field",
+    "function call",
+    "function statement",
+    "function without result",
+    "instance without task",
+    "part access",
+    "result",
+    "sign",
+    "startup function",
+    "subrange",
+];
+
+/// Why no generated program ends in a trap; none: some do.
+#[must_use]
+pub fn not_shown(code: TrapCode) -> Option<&'static str> {
+    match code {
+        TrapCode::DivideByZero | TrapCode::ArrayIndex | TrapCode::Range => None,
+        TrapCode::Reference => Some("the tree has no references"),
+        TrapCode::CallDepth => Some("functions call only those before them, and the verifier counts how deep they go"),
+        TrapCode::Watchdog => Some("the tree has no fuel: what does not end is counted as too long"),
+        TrapCode::Stopped => Some("nobody ends a run from outside"),
+    }
+}
 
 /// Counts of programs, by what they hold.
 #[derive(Debug, Clone, Default)]
@@ -202,6 +270,8 @@ impl Coverage {
         found.conversions.into_iter().for_each(|key| *self.conversions.entry(key).or_default() += 1);
         found.widenings.into_iter().for_each(|key| *self.widenings.entry(key).or_default() += 1);
         found.operators.into_iter().for_each(|key| *self.operators.entry(key).or_default() += 1);
+        let unknown: Vec<_> = found.features.iter().filter(|word| !FEATURES.contains(word)).collect();
+        assert!(unknown.is_empty(), "FEATURES does not name {unknown:?}");
         found.features.into_iter().for_each(|key| *self.features.entry(key).or_default() += 1);
         *self.sizes.entry(size).or_default() += 1;
     }
