@@ -37,6 +37,9 @@ impl Of {
             Of::Kind(Kind::Real) => [0.5f32, 0.75, 0.25, 1.0].map(Value::Real).into(),
             Of::Kind(Kind::Lreal) => [0.5f64, 0.75, 0.25, 1.0].map(Value::Lreal).into(),
             Of::Kind(Kind::Bool) => ints(&[1, 0, 1, 1]),
+            Of::Kind(kind) if kind.is_moment() => [20_000, -1, 3_600_000_000_001, 86_399_000_000_000]
+                .map(|value| Value::Int(khz_proof::st::moments::sayable(kind, value)))
+                .into(),
             Of::Kind(kind) => {
                 let (low, high) = kind.limits();
                 ints(&[5, high - 2, 3, low.max(-(1 << 40)) / 3, 0x29, 0x1A])
@@ -54,7 +57,12 @@ fn literal(of: Of, value: &Value) -> String {
             let sign = if *value < 0 { "-" } else { "" };
             format!("{}#{sign}{}ns", of.name(), value.unsigned_abs())
         }
-        Value::Int(value) => format!("{}#{value}", of.name()),
+        Value::Int(value) => match of {
+            Of::Kind(kind) if kind.is_moment() => {
+                format!("{}#{}", kind.name(), khz_proof::st::moments::text(kind, *value))
+            }
+            _ => format!("{}#{value}", of.name()),
+        },
         Value::Real(value) => format!("REAL#{}", float(format!("{value:?}"))),
         Value::Lreal(value) => format!("LREAL#{}", float(format!("{value:?}"))),
         Value::Many(_) => panic!("no literal of {value:?}"),

@@ -6,7 +6,7 @@
 //! speaks here. The layout's other oracle is the tree of generated Structured Text, which knows no addresses. Its only aim is that a reader can hold it against the document. Where the verifier's promise is broken (a wrong type on the
 //! stack, an access outside the image, a control variable that was proven to be kept and is not), it panics: that is a finding in the verifier, and the panic is its report.
 
-mod calendar;
+pub(crate) mod calendar;
 mod numeric;
 mod step;
 mod strings;

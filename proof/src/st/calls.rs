@@ -5,6 +5,7 @@ use khz_machine::library::functions::{FunctionRow, ResultRule, TABLE, TypeClass}
 use super::expression::{boxed, lit};
 use super::functions::{Function, compares, row, takes};
 use super::generate::Generator;
+use super::moments;
 use super::tree::{Class, Expr, ExprKind, Kind, Op, Ty, UnitKind, Value};
 
 /// Whether a function can give a type.
@@ -19,10 +20,9 @@ fn gives(row: &FunctionRow, kind: Kind) -> bool {
                 row.function != Function::Expt || kind.is_real()
             }
         }
+        ResultRule::Of(ty) => moments::kind_of(ty) == Some(kind),
         // What it gives hangs on the place: see `conversion`.
-        ResultRule::WantedInteger | ResultRule::String | ResultRule::Dint | ResultRule::Of(_) | ResultRule::Nothing => {
-            false
-        }
+        ResultRule::WantedInteger | ResultRule::String | ResultRule::Dint | ResultRule::Nothing => false,
     }
 }
 
@@ -41,6 +41,7 @@ impl Generator {
         let function = row.function;
         match function {
             _ if compares(function) => self.comparison(row, depth),
+            _ if moments::result(function).is_some() => self.of_moments(row, kind, depth),
             Function::IsValid | Function::IsValidBcd => {
                 let class = row.parameters[0].class;
                 let kinds: Vec<Kind> = Kind::ALL.into_iter().filter(|kind| takes(class, *kind)).collect();
@@ -75,6 +76,50 @@ impl Generator {
             }
             _ => self.generic(row, kind, depth),
         }
+    }
+
+    /// A function of table 35 or 36 with types of its own; or ADD or SUB of the same.
+    fn of_moments(&mut self, row: &FunctionRow, kind: Kind, depth: usize) -> Expr {
+        if matches!(row.function, Function::Multime | Function::Divtime) {
+            let op = if row.function == Function::Multime { Op::Mul } else { Op::Div };
+            let time = self.expr(kind, depth);
+            let number = self.factor_of(op, depth);
+            return std(kind, row.function, vec![time, number]);
+        }
+        if row.name.starts_with("SUB") && self.r.chance(30) {
+            let (function, (left, right)) = match kind {
+                Kind::Time | Kind::Ltime => (Function::Sub, self.apart(kind, depth)),
+                _ => (self.r.one_of([Function::Add, Function::Sub]), self.with_duration(kind, depth)),
+            };
+            return std(kind, function, vec![left, right]);
+        }
+        let mut inputs = Vec::new();
+        let fine = self.r.below(3);
+        for parameter in row.parameters {
+            inputs.push(match parameter.class {
+                TypeClass::Of(ty) => {
+                    let wanted = moments::kind_of(ty).unwrap_or(kind);
+                    match self.value(Ty::K(wanted), depth) {
+                        Some(value) => value,
+                        None => self.leaf(wanted),
+                    }
+                }
+                // Those at the end may be left out.
+                TypeClass::FinePart if inputs.len() + fine >= row.parameters.len() => break,
+                _ => self.calendar_part(depth),
+            });
+        }
+        std(kind, row.function, inputs)
+    }
+
+    /// A year, a month, an hour …, mostly one that there is.
+    fn calendar_part(&mut self, depth: usize) -> Expr {
+        if self.r.chance(70) {
+            let number = self.r.one_of([0, 1, 2, 11, 12, 13, 28, 29, 30, 31, 59, 60, 999, 1900, 1970, 2000, 2024, -1]);
+            return lit(Kind::Int, Value::Int(number), self.r.chance(50));
+        }
+        let kind = self.r.one_of(Kind::INTEGERS);
+        self.expr(kind, depth)
     }
 
     /// What is not nothing, so that no division traps, or anything.
@@ -194,6 +239,12 @@ impl Generator {
             let from = self.r.one_of([Kind::Real, Kind::Lreal]);
             let inner = self.expr(from, depth);
             return wrap(std(Kind::Dint, Function::Trunc, vec![inner]));
+        }
+        if kind != Kind::Dint && self.r.chance(6) {
+            // DAY_OF_WEEK gives a DINT there, too.
+            let of = self.r.one_of([Kind::Ldate, Kind::Ldate, Kind::Date]);
+            let inner = self.expr(of, depth);
+            return wrap(std(Kind::Dint, Function::DayOfWeek, vec![inner]));
         }
         let from = self.kind();
         let results = self.source.units.iter().filter(|unit| unit.kind == UnitKind::Function);

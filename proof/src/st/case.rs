@@ -1,5 +1,6 @@
 //! A program with what happens to it: rounds, the time between them, and values that come from outside.
 
+use super::moments;
 use super::spelling::Style;
 use super::tree::{Class, Def, Kind, Source, Ty, Value};
 use crate::random::Random;
@@ -139,6 +140,7 @@ pub(crate) fn value(source: &Source, ty: Ty, random: &mut Random) -> Value {
     match ty {
         Ty::K(Kind::Real) => Value::Real(finite(random) as f32),
         Ty::K(Kind::Lreal) => Value::Lreal(finite(random)),
+        Ty::K(kind) if kind.is_moment() => Value::Int(moments::sayable(kind, i128::from(random.integer(64)))),
         Ty::K(kind) => Value::Int(kind.wrap(i128::from(random.integer(64)))),
         Ty::S(capacity) => {
             let count = random.below(usize::from(capacity.min(12)) + 1);

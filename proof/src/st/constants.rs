@@ -40,7 +40,10 @@ impl Settler<'_> {
     fn node(&mut self, node: Change<'_>) {
         match node {
             Change::Expr(Expr { kind: ExprKind::Bin(Op::Div | Op::Mod, _, divisor), .. }) => self.divisor(divisor),
-            Change::Expr(Expr { kind: ExprKind::Std(Function::Div | Function::Mod, inputs), .. }) => {
+            Change::Expr(Expr {
+                kind: ExprKind::Std(Function::Div | Function::Mod | Function::Divtime, inputs),
+                ..
+            }) => {
                 inputs.iter_mut().skip(1).for_each(|divisor| self.divisor(divisor));
             }
             Change::Expr(_) => {}

@@ -2,6 +2,7 @@
 
 use super::functions::Function;
 use super::generate::Generator;
+use super::moments;
 use super::tree::{Class, Def, Expr, ExprKind, Kind, Op, Ty, UnitKind, Value};
 
 pub(super) fn boxed(expr: Expr) -> Box<Expr> {
@@ -29,6 +30,15 @@ impl Generator {
             Kind::Time | Kind::Ltime => {
                 let ms = i128::from(self.r.between(-20, 60)) * 1_000_000;
                 Value::Int(if self.r.chance(15) { i128::from(self.r.between(-1 << 45, 1 << 45)) } else { ms })
+            }
+            _ if kind.is_moment() => {
+                let any = i128::from(self.r.integer(64));
+                let near = i128::from(self.r.between(-800, 800));
+                let value = match kind {
+                    Kind::Date | Kind::Ldate => near,
+                    _ => near * 3_600_000_000_000,
+                };
+                Value::Int(moments::sayable(kind, if self.r.chance(25) { any } else { value }))
             }
             _ => Value::Int(kind.wrap(i128::from(self.r.integer(64)))),
         }
@@ -177,6 +187,12 @@ impl Generator {
         match kind {
             Kind::Bool => self.truth(d),
             Kind::Time | Kind::Ltime => self.duration(kind, d),
+            Kind::Date | Kind::Ldate => self.function(kind, d),
+            _ if kind.is_moment() => {
+                let op = self.r.one_of([Op::Add, Op::Sub]);
+                let (left, right) = self.with_duration(kind, d);
+                wrap(ExprKind::Bin(op, boxed(left), boxed(right)))
+            }
             Kind::Real | Kind::Lreal => {
                 if self.r.chance(15) {
                     let inner = self.expr(kind, d);
@@ -218,8 +234,37 @@ impl Generator {
         }
     }
 
+    /// A time of day or moment, and a duration: the sum of the two is of a type, long if one of them is.
+    pub(super) fn with_duration(&mut self, kind: Kind, depth: usize) -> (Expr, Expr) {
+        let (short, long) = (if matches!(kind, Kind::Tod | Kind::Ltod) { Kind::Tod } else { Kind::Dt }, kind.long());
+        let (left, right) = match self.r.below(3) {
+            _ if long != Some(kind) => (kind, Kind::Time),
+            0 => (kind, Kind::Time),
+            1 => (short, Kind::Ltime),
+            _ => (kind, Kind::Ltime),
+        };
+        (self.expr(left, depth), self.expr(right, depth))
+    }
+
+    /// Two values of one family: their difference is a TIME, or an LTIME if one of them is long.
+    pub(super) fn apart(&mut self, kind: Kind, depth: usize) -> (Expr, Expr) {
+        let short = self.r.one_of([Kind::Date, Kind::Tod, Kind::Dt]);
+        let long = short.long().unwrap_or(short);
+        let (left, right) = match self.r.below(3) {
+            _ if kind == Kind::Time => (short, short),
+            0 => (short, long),
+            1 => (long, short),
+            _ => (long, long),
+        };
+        (self.expr(left, depth), self.expr(right, depth))
+    }
+
     fn duration(&mut self, kind: Kind, depth: usize) -> Expr {
         let wrap = |expr: ExprKind| Expr { ty: Ty::K(kind), kind: expr };
+        if self.r.chance(20) {
+            let (left, right) = self.apart(kind, depth);
+            return wrap(ExprKind::Bin(Op::Sub, boxed(left), boxed(right)));
+        }
         if self.r.chance(10) {
             let inner = self.expr(kind, depth);
             return wrap(ExprKind::Neg(boxed(inner)));
@@ -241,7 +286,11 @@ impl Generator {
     /// What a duration is multiplied with or divided by.
     pub(super) fn factor(&mut self, depth: usize) -> (Op, Expr) {
         let op = self.r.one_of([Op::Mul, Op::Div]);
-        let number = match self.r.below(3) {
+        (op, self.factor_of(op, depth))
+    }
+
+    pub(super) fn factor_of(&mut self, op: Op, depth: usize) -> Expr {
+        match self.r.below(3) {
             0 => {
                 let kind = self.r.one_of([Kind::Real, Kind::Lreal]);
                 let inner = self.expr(kind, depth);
@@ -266,8 +315,7 @@ impl Generator {
                 let value = i128::from(self.r.one_of([1, 2, 3, 7, -1, -5]));
                 lit(Kind::Int, Value::Int(value), true)
             }
-        };
-        (op, number)
+        }
     }
 
     fn truth(&mut self, depth: usize) -> Expr {

@@ -4,6 +4,7 @@ use khz_bytecode::trap::TrapCode;
 pub use khz_machine::library::functions::StandardFunction as Function;
 use khz_machine::library::functions::{FunctionRow, TABLE, TypeClass};
 
+use super::moments;
 use super::tree::{Kind, Op, Value};
 
 /// The row of a function in the table of the library, which says how it is called and what it takes.
@@ -20,7 +21,8 @@ pub fn row(function: Function) -> &'static FunctionRow {
 pub fn takes(class: TypeClass, kind: Kind) -> bool {
     match class {
         TypeClass::AnyElementary => true,
-        TypeClass::AnyMagnitude => kind != Kind::Bool,
+        // Dates and times of day are summed with durations only.
+        TypeClass::AnyMagnitude => kind != Kind::Bool && !kind.is_moment(),
         TypeClass::AnyNum => kind.is_integer() || kind.is_bits() || kind.is_real(),
         TypeClass::AnyReal | TypeClass::Float => kind.is_real(),
         TypeClass::BitString => kind.is_bits(),
@@ -155,20 +157,23 @@ fn saturate(kind: Kind, whole: f64) -> Value {
 /// When the generator uses none such.
 #[must_use]
 pub fn convert(from: Kind, to: Kind, value: &Value, cut: bool) -> Value {
-    const MILLISECOND: i128 = 1_000_000;
     let float = match value {
         Value::Real(value) => Some(f64::from(*value)),
         Value::Lreal(value) => Some(*value),
         _ => None,
     };
-    if from.is_duration() != to.is_duration() && to != Kind::Bool {
-        // TIME meets numbers in milliseconds, LTIME in nanoseconds, both as a LINT.
-        if from.is_duration() {
-            let whole = if from == Kind::Time { value.int() / MILLISECOND } else { value.int() };
-            return convert(Kind::Lint, to, &Value::Int(whole), cut);
+    if to != Kind::Bool {
+        match (moments::unit_ns(from), moments::unit_ns(to)) {
+            (Some(_), Some(_)) => return Value::Int(moments::convert(from, to, value.int())),
+            // Numbers meet them as a LINT of their unit.
+            (Some(unit), None) => return convert(Kind::Lint, to, &Value::Int(value.int() / unit), cut),
+            (None, Some(unit)) => {
+                let whole = convert(from, Kind::Lint, value, cut).int();
+                let ns = Kind::Lint.wrap(whole.wrapping_mul(unit));
+                return Value::Int(moments::convert(Kind::Ltime, to, ns));
+            }
+            (None, None) => {}
         }
-        let whole = convert(from, Kind::Lint, value, cut).int();
-        return Value::Int(to.wrap(if to == Kind::Time { whole.wrapping_mul(MILLISECOND) } else { whole }));
     }
     match (float, to) {
         (Some(value), Kind::Bool) => Value::Int(i128::from(value != 0.0)),
@@ -277,6 +282,9 @@ pub fn standard(function: Function, kind: Kind, values: &[Value]) -> Result<Opti
         return values[1..].iter().try_fold(first, |a, b| binary(op, kind, &a, b)).map(Some);
     }
     if let Some(found) = float(function, &values[0]) {
+        return Ok(Some(found));
+    }
+    if let Some(found) = moments::standard(function, kind, values)? {
         return Ok(Some(found));
     }
     Ok(Some(match function {

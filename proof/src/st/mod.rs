@@ -21,6 +21,7 @@ mod flow;
 pub mod functions;
 mod generate;
 mod memory;
+pub mod moments;
 mod places;
 pub mod position;
 pub mod print;

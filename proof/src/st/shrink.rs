@@ -483,6 +483,7 @@ fn literals(ty: Ty) -> Vec<Value> {
         Ty::K(Kind::Real) => vec![Value::Real(1.0)],
         Ty::K(Kind::Lreal) => vec![Value::Lreal(1.0)],
         Ty::K(Kind::Bool) => vec![Value::Int(0), Value::Int(1)],
+        Ty::K(kind) if kind.is_moment() => vec![Value::Int(0)],
         Ty::K(kind) => vec![Value::Int(0), Value::Int(1), Value::Int(kind.wrap(-1))],
         Ty::S(_) => vec![Value::Str(Vec::new())],
         Ty::N(_) => Vec::new(),

@@ -2,6 +2,7 @@
 
 use std::fmt::Write;
 
+use super::moments;
 use super::tree::{Area, At, Def, Kind, Source, Ty, Value};
 use crate::random::Random;
 
@@ -54,6 +55,23 @@ impl Style {
         format!("{prefix}#{sign}{}ms{}us{}ns", all / 1_000_000, all / 1000 % 1000, all % 1000)
     }
 
+    fn moment(&mut self, kind: Kind, value: i128) -> String {
+        let names = match kind {
+            Kind::Date => ["D", "DATE"],
+            Kind::Ldate => ["LD", "LDATE"],
+            Kind::Tod => ["TOD", "TIME_OF_DAY"],
+            Kind::Ltod => ["LTOD", "LTIME_OF_DAY"],
+            Kind::Dt => ["DT", "DATE_AND_TIME"],
+            _ => ["LDT", "LDATE_AND_TIME"],
+        };
+        let name = names[usize::from(self.chance(30))];
+        let name = if self.chance(10) { name.to_lowercase() } else { name.to_string() };
+        // What no literal can say is none that a compiler takes, so that the shrinker does not go there.
+        let is_day = matches!(kind, Kind::Date | Kind::Ldate) && value % moments::DAY_NS != 0;
+        let outside = matches!(kind, Kind::Tod | Kind::Ltod) && !(0..moments::DAY_NS).contains(&value);
+        if is_day || outside { format!("{name}#0") } else { format!("{name}#{}", moments::text(kind, value)) }
+    }
+
     /// A constant where a declaration wants one: numbers also as sums.
     pub(super) fn initial(&mut self, source: &Source, ty: Ty, value: &Value) -> String {
         if let (Ty::K(kind), Value::Int(number)) = (ty, value)
@@ -94,6 +112,7 @@ impl Style {
                 return word[if self.chance(10) { self.below(3) } else { 0 }].to_string();
             }
             (Ty::K(kind), Value::Int(value)) if kind.is_duration() => return self.time(kind == Kind::Ltime, *value),
+            (Ty::K(kind), Value::Int(value)) if kind.is_moment() => return self.moment(kind, *value),
             (Ty::K(kind), Value::Int(value)) if kind.is_bits() => (kind.name(), format!("16#{value:X}")),
             (Ty::K(kind), Value::Int(value)) => (kind.name(), self.number(*value)),
             (Ty::K(kind), Value::Real(value)) => (kind.name(), real(&format!("{value:?}"))),

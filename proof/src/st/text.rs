@@ -1,6 +1,7 @@
 //! Strings: their functions, and values as text.
 
 use super::functions::Function;
+use super::moments;
 use super::tree::{Kind, Value};
 
 /// The bytes `from..from + count` by a 1-based position, clamped to the string.
@@ -95,6 +96,14 @@ pub fn write(kind: Kind, value: &Value) -> Vec<u8> {
         Value::Lreal(value) => float(*value, &format!("{value}"), &format!("{value:e}")),
         _ if kind == Kind::Bool => if value.int() == 0 { "FALSE" } else { "TRUE" }.to_string(),
         _ if kind.is_duration() => duration(value.int()),
+        _ if kind.is_moment() => {
+            let name = match kind {
+                Kind::Date | Kind::Ldate => "D",
+                Kind::Tod | Kind::Ltod => "TOD",
+                _ => "DT",
+            };
+            format!("{name}#{}", moments::text(kind, value.int()))
+        }
         _ => value.int().to_string(),
     };
     text.into_bytes()
@@ -153,6 +162,7 @@ pub fn read(kind: Kind, text: &[u8]) -> Value {
         Kind::Real => return Value::Real(decimal(text).parse().unwrap_or(0.0)),
         Kind::Lreal => return Value::Lreal(decimal(text).parse().unwrap_or(0.0)),
         Kind::Time | Kind::Ltime => return Value::Int(kind.wrap(time(text))),
+        _ if kind.is_moment() => return Value::Int(moments::read(kind, text)),
         _ => {}
     }
     let (sign, digits) = match text.split_first() {

@@ -21,11 +21,17 @@ pub enum Kind {
     Lreal,
     Time,
     Ltime,
+    Date,
+    Ldate,
+    Tod,
+    Ltod,
+    Dt,
+    Ldt,
 }
 
 impl Kind {
     /// All of them.
-    pub const ALL: [Kind; 17] = [
+    pub const ALL: [Kind; 23] = [
         Kind::Bool,
         Kind::Sint,
         Kind::Int,
@@ -43,7 +49,15 @@ impl Kind {
         Kind::Lreal,
         Kind::Time,
         Kind::Ltime,
+        Kind::Date,
+        Kind::Ldate,
+        Kind::Tod,
+        Kind::Ltod,
+        Kind::Dt,
+        Kind::Ldt,
     ];
+    /// DATE to LDT.
+    pub const MOMENTS: [Kind; 6] = [Kind::Date, Kind::Ldate, Kind::Tod, Kind::Ltod, Kind::Dt, Kind::Ldt];
     /// SINT to ULINT.
     pub const INTEGERS: [Kind; 8] =
         [Kind::Sint, Kind::Int, Kind::Dint, Kind::Lint, Kind::Usint, Kind::Uint, Kind::Udint, Kind::Ulint];
@@ -53,9 +67,9 @@ impl Kind {
     /// Its keyword.
     #[must_use]
     pub fn name(self) -> &'static str {
-        const NAMES: [&str; 17] = [
+        const NAMES: [&str; 23] = [
             "BOOL", "SINT", "INT", "DINT", "LINT", "USINT", "UINT", "UDINT", "ULINT", "BYTE", "WORD", "DWORD", "LWORD",
-            "REAL", "LREAL", "TIME", "LTIME",
+            "REAL", "LREAL", "TIME", "LTIME", "DATE", "LDATE", "TOD", "LTOD", "DT", "LDT",
         ];
         NAMES[self as usize]
     }
@@ -63,13 +77,16 @@ impl Kind {
     /// Width in bits; of BOOL 1.
     #[must_use]
     pub fn bits(self) -> u32 {
+        if self.is_moment() {
+            return 64;
+        }
         [1, 8, 16, 32, 64, 8, 16, 32, 64, 8, 16, 32, 64, 32, 64, 64, 64][self as usize]
     }
 
-    /// SINT to LINT, TIME and LTIME.
+    /// SINT to LINT, TIME and LTIME, DATE to LDT.
     #[must_use]
     pub fn is_signed(self) -> bool {
-        matches!(self, Kind::Sint | Kind::Int | Kind::Dint | Kind::Lint | Kind::Time | Kind::Ltime)
+        matches!(self, Kind::Sint | Kind::Int | Kind::Dint | Kind::Lint) || self.is_duration() || self.is_moment()
     }
 
     /// SINT to ULINT.
@@ -112,6 +129,24 @@ impl Kind {
         matches!(self, Kind::Time | Kind::Ltime)
     }
 
+    /// DATE, TIME_OF_DAY, DATE_AND_TIME and their L-forms.
+    #[must_use]
+    pub fn is_moment(self) -> bool {
+        Kind::MOMENTS.contains(&self)
+    }
+
+    /// The L-form of a duration, date or time of day; of an L-form itself.
+    #[must_use]
+    pub fn long(self) -> Option<Kind> {
+        Some(match self {
+            Kind::Time | Kind::Ltime => Kind::Ltime,
+            Kind::Date | Kind::Ldate => Kind::Ldate,
+            Kind::Tod | Kind::Ltod => Kind::Ltod,
+            Kind::Dt | Kind::Ldt => Kind::Ldt,
+            _ => return None,
+        })
+    }
+
     /// Whether a value of this type becomes one of another by itself: what the standard's figure has, and between numbers of any width
     /// what vendors have besides. Integers keep their low bits, an LREAL is rounded.
     #[must_use]
@@ -122,7 +157,7 @@ impl Kind {
             || (self.is_integer() && to.is_real())
             || (self.is_real() && to.is_real())
             || (self == Kind::Bool && to.is_bits())
-            || (self == Kind::Time && to == Kind::Ltime)
+            || self.long() == Some(to)
     }
 
     /// The type in which the operands of an operation meet. Integers meet in the wider one, and in a signed one that holds both while
@@ -138,8 +173,8 @@ impl Kind {
             (false, true) => Some((other, self)),
             _ => None,
         };
-        if self.is_duration() && other.is_duration() {
-            return Some(Kind::Ltime);
+        if let (Some(long), Some(same)) = (self.long(), other.long()) {
+            return (long == same).then_some(long);
         }
         if self.is_real() && other.is_real() {
             return Some(Kind::Lreal);
