@@ -167,7 +167,11 @@ fn group(row: &FunctionRow) -> Vec<Of> {
     let mut group: Vec<Of> = Vec::new();
     if let Some(class) = generic.first() {
         // The remainder of a duration is not defined, and EXPT is over what its base is.
-        group.extend(Kind::ALL.into_iter().filter(|kind| takes(*class, *kind)).map(Of::Kind));
+        // Turned bytes are no whole day and no time within one, which a literal could say.
+        let unsaid =
+            |kind: Kind| *class == TypeClass::Bytes && kind.is_moment() && !matches!(kind, Kind::Dt | Kind::Ldt);
+        let taken = Kind::ALL.into_iter().filter(|kind| takes(*class, *kind) && !unsaid(*kind));
+        group.extend(taken.map(Of::Kind));
     }
     if generic.is_empty() || generic.contains(&TypeClass::AnyElementary) {
         group.push(Of::Text);
