@@ -335,12 +335,17 @@ impl<'a> Checker<'_, 'a> {
             F::Max => BinOp::Max,
             _ => BinOp::Atan2,
         };
+        // A literal beside a typed operand is of that type, whatever the result goes to.
+        let typed =
+            values.iter().filter_map(|value| self.an.types.elementary(value.ty)).max_by_key(|ty| *ty != E::Real);
+        let beside = match typed {
+            Some(E::Real) => Ty::Elem(E::Real),
+            Some(_) => Ty::Elem(E::Lreal),
+            None => want,
+        };
         let mut found: Option<Expr> = None;
         for value in values {
-            let value = match op {
-                BinOp::Min | BinOp::Max | BinOp::Atan2 => self.settle_number(value, want, op == BinOp::Atan2),
-                _ => value,
-            };
+            let value = if op == BinOp::Atan2 { self.as_real(value, beside) } else { value };
             found = Some(match found {
                 None => value,
                 Some(before) => self.binary_op(op, before, value, span, want),
@@ -359,14 +364,6 @@ impl<'a> Checker<'_, 'a> {
             }
         }
         inner
-    }
-
-    fn settle_number(&mut self, value: Expr, want: Ty, real: bool) -> Expr {
-        if real && value.ty == Ty::IntLit {
-            let to = if self.an.types.elementary(want) == Some(E::Real) { E::Real } else { E::Lreal };
-            return self.literal(&value, to);
-        }
-        if real { self.as_real(value, want) } else { value }
     }
 
     /// An operand of a function over ANY_REAL: an integer becomes an LREAL.
