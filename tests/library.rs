@@ -12,11 +12,12 @@ use khz_machine::library::functions::{FunctionRow, ResultRule, StandardFunction 
 use khz_proof::st::functions::{standard, takes};
 use khz_proof::st::tree::{Kind, Value};
 
-/// A type of inputs: an elementary one, or STRING.
+/// A type of inputs: an elementary one, STRING or WSTRING.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Of {
     Kind(Kind),
     Text,
+    Wide,
 }
 
 impl Of {
@@ -24,6 +25,7 @@ impl Of {
         match self {
             Of::Kind(kind) => kind.name(),
             Of::Text => "STRING",
+            Of::Wide => "WSTRING",
         }
     }
 
@@ -31,9 +33,10 @@ impl Of {
     fn samples(self) -> Vec<Value> {
         let ints = |list: &[i128]| list.iter().map(|value| Value::Int(*value)).collect();
         match self {
-            Of::Text => {
-                ["pear", "apple", "fig", "apple"].iter().map(|text| Value::Str(text.as_bytes().into())).collect()
-            }
+            Of::Text => ["pear", "apple", "fig", "apple"].map(|text| Value::Str(text.encode_utf16().collect())).into(),
+            Of::Wide => ["\u{3a9}\u{20ac}ar", "apple", "\u{3a9}g", "apple"]
+                .map(|text| Value::Str(text.encode_utf16().collect()))
+                .into(),
             Of::Kind(Kind::Real) => [0.5f32, 0.75, 0.25, 1.0].map(Value::Real).into(),
             Of::Kind(Kind::Lreal) => [0.5f64, 0.75, 0.25, 1.0].map(Value::Lreal).into(),
             Of::Kind(Kind::Bool) => ints(&[1, 0, 1, 1]),
@@ -51,7 +54,10 @@ impl Of {
 fn literal(of: Of, value: &Value) -> String {
     let float = |text: String| if text.contains('.') { text } else { text.replace('e', ".0e") };
     match value {
-        Value::Str(text) => format!("'{}'", String::from_utf8_lossy(text)),
+        Value::Str(text) => {
+            let quote = if of == Of::Wide { '"' } else { '\'' };
+            format!("{quote}{}{quote}", String::from_utf16_lossy(text))
+        }
         Value::Int(value) if of == Of::Kind(Kind::Bool) => if *value == 0 { "FALSE" } else { "TRUE" }.into(),
         Value::Int(value) if matches!(of, Of::Kind(kind) if kind.is_duration()) => {
             let sign = if *value < 0 { "-" } else { "" };
@@ -101,7 +107,7 @@ fn result_type(row: &FunctionRow, of: Of) -> Of {
         ResultRule::Generic => of,
         ResultRule::Bool => Of::Kind(Kind::Bool),
         ResultRule::Int => Of::Kind(Kind::Int),
-        ResultRule::String => Of::Text,
+        ResultRule::String => of,
         ResultRule::Dint | ResultRule::WantedInteger => Of::Kind(Kind::Dint),
         ResultRule::Of(_) | ResultRule::Nothing => panic!("{} has rows of its own", row.name),
     }
@@ -136,7 +142,7 @@ fn program(row: &FunctionRow, of: Of) -> (String, usize) {
         let values: Vec<Value> = given.iter().map(|(_, value)| value.clone()).collect();
         let kind = match result {
             Of::Kind(kind) => kind,
-            Of::Text => Kind::Int,
+            Of::Text | Of::Wide => Kind::Int,
         };
         // What divides by zero says nothing here.
         let Ok(Some(right)) = standard(row.function, kind, &values) else { continue };
@@ -174,7 +180,7 @@ fn group(row: &FunctionRow) -> Vec<Of> {
         group.extend(taken.map(Of::Kind));
     }
     if generic.is_empty() || generic.contains(&TypeClass::AnyElementary) {
-        group.push(Of::Text);
+        group.extend([Of::Text, Of::Wide]);
     }
     group
 }

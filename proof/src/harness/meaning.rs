@@ -162,7 +162,8 @@ fn same(source: &Source, ty: Ty, wanted: &Value, got: &VariableValue) -> bool {
         (Value::Real(a), VariableValue::Real(b)) => a.to_bits() == b.to_bits(),
         (Value::Lreal(a), VariableValue::Lreal(b)) if a.is_nan() => b.to_bits() == 0xFFF8_0000_0000_0000,
         (Value::Lreal(a), VariableValue::Lreal(b)) => a.to_bits() == b.to_bits(),
-        (Value::Str(a), VariableValue::String(b)) => a == b,
+        (Value::Str(a), VariableValue::String(b)) => a.iter().copied().eq(b.iter().copied().map(u16::from)),
+        (Value::Str(a), VariableValue::WideString(b)) => a == b,
         (Value::Int(a), VariableValue::Named(name)) => match ty {
             Ty::N(id) => match &source.types[id].def {
                 Def::Enum(_, values) => values

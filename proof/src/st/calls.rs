@@ -48,14 +48,18 @@ impl Generator {
                 let of = self.r.pick(&kinds).copied().unwrap_or(kind);
                 std(kind, function, vec![self.expr(of, depth)])
             }
-            Function::Len => std(kind, function, vec![self.string(depth)]),
+            Function::Len => {
+                let wide = self.r.chance(40);
+                std(kind, function, vec![self.string(wide, depth)])
+            }
             Function::Find => {
-                let wanted = self.r.one_of([&b"a"[..], b"1", b"ab", b"A0", b"", b".", b"1.0"]).to_vec();
-                let text = self.string(depth);
+                let wide = self.r.chance(40);
+                let wanted = self.r.one_of(["a", "1", "ab", "A0", "", ".", "1.0", "\u{e9}"]).encode_utf16().collect();
+                let text = self.string(wide, depth);
                 let wanted = if self.r.chance(80) {
-                    Expr { ty: Ty::S(3), kind: ExprKind::Lit(Value::Str(wanted), false) }
+                    Expr { ty: Ty::text(wide, 3), kind: ExprKind::Lit(Value::Str(wanted), false) }
                 } else {
-                    self.string(0)
+                    self.string(wide, 0)
                 };
                 std(kind, function, vec![text, wanted])
             }
@@ -155,7 +159,6 @@ impl Generator {
             let input = match row.parameters[at.min(last)].class {
                 TypeClass::Bool => self.expr(Kind::Bool, depth),
                 TypeClass::Count => self.count(i64::from(kind.bits()), depth),
-                TypeClass::AnyString | TypeClass::AnyChars => self.string(depth),
                 // An integer where only floats are taken becomes an LREAL.
                 TypeClass::AnyReal if kind == Kind::Lreal && row.parameters.len() == 1 && self.r.chance(15) => {
                     let from = self.r.one_of(Kind::INTEGERS);
@@ -200,8 +203,9 @@ impl Generator {
         let more = if row.extensible { self.r.weighted(&[5, 2, 1]) } else { 0 };
         let mut inputs = Vec::new();
         if self.r.chance(15) {
+            let wide = self.r.chance(40);
             for _ in 0..2 + more {
-                inputs.push(self.string(depth.min(1)));
+                inputs.push(self.string(wide, depth.min(1)));
             }
         } else {
             let kind = self.kind();
@@ -214,7 +218,7 @@ impl Generator {
 
     /// A string that no integer type overflows at.
     fn place_of_short_string(&mut self) -> Option<Expr> {
-        let ty = Ty::S(self.r.one_of([2, 5, 8]));
+        let ty = Ty::text(self.r.chance(40), self.r.one_of([2, 5, 8]));
         let place = self.place(ty, false)?;
         Some(Expr { ty, kind: ExprKind::Get(place) })
     }
@@ -223,7 +227,12 @@ impl Generator {
         let wrap = |inner: Expr| Expr { ty: Ty::K(kind), kind: ExprKind::Conv(boxed(inner)) };
         if self.r.chance(15) {
             let is_whole = kind.is_integer() || kind.is_bits();
-            let text = if is_whole { self.place_of_short_string() } else { Some(self.string(depth)) };
+            let text = if is_whole {
+                self.place_of_short_string()
+            } else {
+                let wide = self.r.chance(40);
+                Some(self.string(wide, depth))
+            };
             return text.map_or_else(|| self.leaf(kind), wrap);
         }
         if self.r.chance(8) {
@@ -266,29 +275,34 @@ impl Generator {
         if cut { Expr { ty: Ty::K(kind), kind: ExprKind::Trunc(boxed(inner)) } } else { wrap(inner) }
     }
 
-    /// An expression of a string type.
-    pub(super) fn string(&mut self, depth: usize) -> Expr {
+    /// A STRING or a WSTRING.
+    pub(super) fn string(&mut self, wide: bool, depth: usize) -> Expr {
         let capacity = self.r.one_of([1, 2, 5, 8, 12, 20]);
         if depth == 0 || self.r.chance(40) {
-            let read = if self.r.chance(75) { self.place(Ty::S(capacity), false) } else { None };
+            let ty = Ty::text(wide, capacity);
+            let read = if self.r.chance(75) { self.place(ty, false) } else { None };
             return match read {
-                Some(place) => Expr { ty: Ty::S(capacity), kind: ExprKind::Get(place) },
+                Some(place) => Expr { ty, kind: ExprKind::Get(place) },
                 None => {
-                    let text = self.text(12);
-                    Expr { ty: Ty::S(12), kind: ExprKind::Lit(Value::Str(text), false) }
+                    let text = self.text(wide, 12);
+                    Expr { ty: Ty::text(wide, 12), kind: ExprKind::Lit(Value::Str(text), self.r.chance(15)) }
                 }
             };
         }
         let d = depth - 1;
         if self.r.chance(15)
-            && let Some(call) = self.call(Ty::S(capacity), d)
+            && let Some(call) = self.call(Ty::text(wide, capacity), d)
         {
             return call;
         }
         if self.r.chance(20) {
-            let kind = self.kind();
-            let inner = self.expr(kind, d);
-            return Expr { ty: Ty::S(80), kind: ExprKind::Conv(boxed(inner)) };
+            let inner = if self.r.chance(25) {
+                self.string(!wide, d.min(1))
+            } else {
+                let kind = self.kind();
+                self.expr(kind, d)
+            };
+            return Expr { ty: Ty::text(wide, 80), kind: ExprKind::Conv(boxed(inner)) };
         }
         let takes_text = |row: &&FunctionRow| {
             let chooses = row.result == ResultRule::Generic
@@ -296,7 +310,7 @@ impl Generator {
             row.result == ResultRule::String || chooses
         };
         let rows: Vec<&FunctionRow> = TABLE.iter().filter(takes_text).collect();
-        let Some(found) = self.r.pick(&rows).copied() else { return self.string(0) };
+        let Some(found) = self.r.pick(&rows).copied() else { return self.string(wide, 0) };
         let more = if found.extensible && self.r.chance(25) { 1 } else { 0 };
         let mut inputs = Vec::new();
         let last = found.parameters.len() - 1;
@@ -304,10 +318,10 @@ impl Generator {
             inputs.push(match found.parameters[at.min(last)].class {
                 TypeClass::Bool => self.expr(Kind::Bool, d),
                 TypeClass::Count => self.count(9, d),
-                _ => self.string(if at == 0 { d.min(1) } else { 0 }),
+                _ => self.string(wide, if at == 0 { d.min(1) } else { 0 }),
             });
         }
         debug_assert_eq!(row(found.function).name, found.name);
-        Expr { ty: Ty::S(80), kind: ExprKind::Std(found.function, inputs) }
+        Expr { ty: Ty::text(wide, 80), kind: ExprKind::Std(found.function, inputs) }
     }
 }

@@ -142,9 +142,15 @@ pub(crate) fn value(source: &Source, ty: Ty, random: &mut Random) -> Value {
         Ty::K(Kind::Lreal) => Value::Lreal(finite(random)),
         Ty::K(kind) if kind.is_moment() => Value::Int(moments::sayable(kind, i128::from(random.integer(64)))),
         Ty::K(kind) => Value::Int(kind.wrap(i128::from(random.integer(64)))),
-        Ty::S(capacity) => {
+        Ty::S(capacity) | Ty::W(capacity) => {
             let count = random.below(usize::from(capacity.min(12)) + 1);
-            Value::Str((0..count).map(|_| random.one_of([b'a', b'A', b'0', b'7', b'-', b'$', 0xE9])).collect())
+            let last = if ty.is_wide() { 0x20AC } else { 0xE9 };
+            let units = [b'a', b'A', b'0', b'7', b'-', b'$'].map(u16::from);
+            Value::Str(
+                (0..count)
+                    .map(|_| random.pick(&units).copied().filter(|_| random.chance(86)).unwrap_or(last))
+                    .collect(),
+            )
         }
         Ty::N(id) => match &source.types[id].def {
             Def::Enum(_, values) => Value::Int(random.pick(values).map_or(0, |(_, value)| i128::from(*value))),

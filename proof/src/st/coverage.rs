@@ -112,6 +112,7 @@ fn name(source: &Source, ty: Ty) -> String {
     match ty {
         Ty::K(kind) => kind.name().to_string(),
         Ty::S(_) => "STRING".to_string(),
+        Ty::W(_) => "WSTRING".to_string(),
         Ty::N(id) => match &source.types[id].def {
             Def::Enum(..) => "enumeration".to_string(),
             Def::Subrange(..) => "subrange".to_string(),

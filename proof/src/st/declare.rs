@@ -76,7 +76,7 @@ impl Generator {
     fn any_type(&mut self, plain: bool) -> Ty {
         match self.r.weighted(&[60, 12, if plain { 0 } else { 40 }]) {
             0 => Ty::K(self.kind()),
-            1 => Ty::S(self.capacity()),
+            1 => Ty::text(self.r.chance(40), self.capacity()),
             _ => {
                 let count = self.source.types.len();
                 Ty::N(self.r.below(count))
@@ -94,7 +94,7 @@ impl Generator {
         }
         match ty {
             Ty::K(kind) => Some(self.number(kind)),
-            Ty::S(capacity) => Some(Value::Str(self.text(usize::from(capacity)))),
+            Ty::S(capacity) | Ty::W(capacity) => Some(Value::Str(self.text(ty.is_wide(), usize::from(capacity)))),
             Ty::N(id) => match self.source.types[id].def.clone() {
                 Def::Enum(_, values) => self.r.pick(&values).map(|(_, value)| Value::Int(i128::from(*value))),
                 Def::Subrange(_, low, high) => Some(Value::Int(if self.r.chance(50) { low } else { high })),

@@ -254,8 +254,8 @@ impl<'s> Evaluator<'s> {
         {
             return Err(self.trap(from, TrapCode::Range, [value.int() as i64, *low as i64, *high as i64]));
         }
-        if let (Ty::S(capacity), Value::Str(bytes)) = (ty, &mut value) {
-            bytes.truncate(usize::from(capacity));
+        if let (Some(capacity), Value::Str(units)) = (ty.capacity(), &mut value) {
+            units.truncate(usize::from(capacity));
         }
         self.memory.write(place, value);
         Ok(())
@@ -286,8 +286,12 @@ impl<'s> Evaluator<'s> {
             ExprKind::Widen(inner) | ExprKind::Conv(inner) | ExprKind::Trunc(inner) => {
                 let value = self.expr(context, inner)?;
                 match (inner.ty, expr.ty) {
-                    (Ty::S(_), Ty::K(to)) => text::read(to, value.bytes()),
-                    (from, Ty::S(capacity)) => {
+                    (Ty::S(_) | Ty::W(_), Ty::K(to)) => text::read(to, &text::narrow(value.units())),
+                    (Ty::S(_) | Ty::W(_), Ty::W(_)) => value,
+                    (Ty::S(_) | Ty::W(_), Ty::S(_)) => {
+                        Value::Str(text::narrow(value.units()).into_iter().map(u16::from).collect())
+                    }
+                    (from, Ty::S(capacity) | Ty::W(capacity)) => {
                         let mut text = text::write(kind(from), &value);
                         text.truncate(usize::from(capacity));
                         Value::Str(text)

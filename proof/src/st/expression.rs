@@ -44,11 +44,17 @@ impl Generator {
         }
     }
 
-    pub(super) fn text(&mut self, most: usize) -> Vec<u8> {
+    /// The units of a text; wide ones are beyond Latin-1 too, and halves of what takes two.
+    pub(super) fn text(&mut self, wide: bool, most: usize) -> Vec<u16> {
         let count = self.r.below(most.min(12) + 1);
         (0..count)
             .map(|_| {
-                self.r.one_of([b'a', b'b', b'A', b'0', b'1', b'7', b'-', b'$', b'\'', b'.', b'E', b' ', 0xE9, 0x0A])
+                if wide && self.r.chance(20) {
+                    return self.r.one_of([0x100, 0x3A9, 0x20AC, 0xD83D, 0xDE00, 0xFFFF, 0x0130]);
+                }
+                let narrow =
+                    [b'a', b'b', b'A', b'0', b'1', b'7', b'-', b'$', b'\'', b'"', b'.', b'E', b' ', 0xE9, 0x0A, 0x09];
+                u16::from(self.r.one_of(narrow))
             })
             .collect()
     }
@@ -62,7 +68,7 @@ impl Generator {
                 }
                 Some(self.expr(kind, depth))
             }
-            Ty::S(_) => Some(self.string(depth)),
+            Ty::S(_) | Ty::W(_) => Some(self.string(ty.is_wide(), depth)),
             Ty::N(id) => match self.source.types[id].def.clone() {
                 Def::Enum(_, values) => Some(self.enumerated(ty, &values, depth)),
                 Def::Subrange(base, low, high) => {
@@ -328,7 +334,8 @@ impl Generator {
             }
             4 => {
                 let op = self.r.one_of(compare);
-                let (left, right) = (self.string(depth), self.string(depth));
+                let wide = self.r.chance(40);
+                let (left, right) = (self.string(wide, depth), self.string(wide, depth));
                 wrap(ExprKind::Bin(op, boxed(left), boxed(right)))
             }
             5 => {

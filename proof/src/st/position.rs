@@ -44,6 +44,8 @@ pub struct Positions {
     starts: BTreeMap<Key, usize>,
     /// Position of the first character of each line.
     lines: Vec<usize>,
+    /// Positions of the bytes that begin no character: a column counts characters.
+    inner: Vec<usize>,
 }
 
 impl Positions {
@@ -53,6 +55,7 @@ impl Positions {
 
     pub(super) fn finish(&mut self, text: &str) {
         self.lines = std::iter::once(0).chain(text.match_indices('\n').map(|(at, _)| at + 1)).collect();
+        self.inner = (0..text.len()).filter(|at| !text.is_char_boundary(*at)).collect();
     }
 
     /// Line and column of a part; none when it was not printed.
@@ -60,6 +63,9 @@ impl Positions {
     pub fn of(&self, key: Key) -> Option<(u32, u32)> {
         let start = *self.starts.get(&key)?;
         let line = self.lines.partition_point(|first| *first <= start);
-        Some((line as u32, (start - self.lines[line - 1]) as u32 + 1))
+        let first = self.lines[line - 1];
+        let before = |end: usize| self.inner.partition_point(|at| *at < end);
+        let column = start - first - (before(start) - before(first)) + 1;
+        Some((line as u32, column as u32))
     }
 }

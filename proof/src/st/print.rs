@@ -337,6 +337,7 @@ impl<'s> Printer<'s> {
                     Ty::K(kind) => kind.name().to_string(),
                     Ty::N(_) => type_name(self.source, ty),
                     Ty::S(_) => "STRING".to_string(),
+                    Ty::W(_) => "WSTRING".to_string(),
                 };
                 let (from, to) = (base(inner.ty), base(expr.ty));
                 // What the argument is says it too, unless that is a literal without a type.

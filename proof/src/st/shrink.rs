@@ -368,9 +368,9 @@ impl Editor {
                     *number = smaller;
                 }
             }
-            Value::Str(bytes) => {
-                if !bytes.is_empty() && self.here() {
-                    bytes.clear();
+            Value::Str(units) => {
+                if !units.is_empty() && self.here() {
+                    units.clear();
                 }
             }
             Value::Many(parts) => parts.iter_mut().for_each(|part| self.value(part)),
@@ -431,7 +431,7 @@ impl Editor {
 
     fn expr(&mut self, expr: &mut Expr) {
         if let ExprKind::Lit(value, _) = &mut expr.kind {
-            if matches!(expr.ty, Ty::K(_) | Ty::S(_)) {
+            if matches!(expr.ty, Ty::K(_) | Ty::S(_) | Ty::W(_)) {
                 self.value(value);
             }
             return;
@@ -485,7 +485,7 @@ fn literals(ty: Ty) -> Vec<Value> {
         Ty::K(Kind::Bool) => vec![Value::Int(0), Value::Int(1)],
         Ty::K(kind) if kind.is_moment() => vec![Value::Int(0)],
         Ty::K(kind) => vec![Value::Int(0), Value::Int(1), Value::Int(kind.wrap(-1))],
-        Ty::S(_) => vec![Value::Str(Vec::new())],
+        Ty::S(_) | Ty::W(_) => vec![Value::Str(Vec::new())],
         Ty::N(_) => Vec::new(),
     }
 }

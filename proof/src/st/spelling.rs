@@ -117,7 +117,9 @@ impl Style {
             (Ty::K(kind), Value::Int(value)) => (kind.name(), self.number(*value)),
             (Ty::K(kind), Value::Real(value)) => (kind.name(), real(&format!("{value:?}"))),
             (Ty::K(kind), Value::Lreal(value)) => (kind.name(), real(&format!("{value:?}"))),
-            (_, Value::Str(bytes)) => return quoted(bytes),
+            (_, Value::Str(units)) => {
+                (if ty.is_wide() { "WSTRING" } else { "STRING" }, self.quoted(ty.is_wide(), units))
+            }
             (Ty::N(id), Value::Int(value)) => match &source.types[id].def {
                 Def::Enum(_, values) => {
                     let name = values.iter().find(|(_, known)| i128::from(*known) == *value);
@@ -142,6 +144,31 @@ impl Style {
             _ => panic!("no literal of {ty:?}"),
         };
         if typed { format!("{prefix}#{plain}") } else { plain }
+    }
+
+    /// A text in its quotes. Whatever can stand in it by itself may be written as a number too.
+    fn quoted(&mut self, wide: bool, units: &[u16]) -> String {
+        let quote = if wide { '"' } else { '\'' };
+        let mut text = String::from(quote);
+        for unit in units {
+            let plain = char::from_u32(u32::from(*unit)).filter(|char| !char.is_control());
+            match plain {
+                Some('$') => text.push_str("$$"),
+                Some(char @ ('"' | '\'')) if char == quote || self.chance(20) => drop(write!(text, "${char}")),
+                Some(char) if char.is_ascii() && !self.chance(3) => text.push(char),
+                Some(char) if !char.is_ascii() && self.chance(40) => text.push(char),
+                _ => {
+                    let (name, digits) = (named(*unit), if wide { 4 } else { 2 });
+                    match name {
+                        Some(name) if self.chance(50) => drop(write!(text, "${name}")),
+                        _ if self.chance(30) => drop(write!(text, "${unit:0digits$x}")),
+                        _ => drop(write!(text, "${unit:0digits$X}")),
+                    }
+                }
+            }
+        }
+        text.push(quote);
+        text
     }
 
     /// What stands behind the name of a type.
@@ -181,7 +208,9 @@ pub(super) fn type_name(source: &Source, ty: Ty) -> String {
     match ty {
         Ty::K(kind) => kind.name().to_string(),
         Ty::S(80) => "STRING".to_string(),
+        Ty::W(80) => "WSTRING".to_string(),
         Ty::S(capacity) => format!("STRING[{capacity}]"),
+        Ty::W(capacity) => format!("WSTRING[{capacity}]"),
         Ty::N(id) => match &source.types[id].def {
             Def::Block(unit) => source.units[*unit].name.clone(),
             Def::Standard(standard) => standard.name(),
@@ -208,23 +237,21 @@ pub(super) fn address(at: At, kind: Kind) -> String {
     format!("%{area}{size}{}", at.byte / bytes)
 }
 
+/// The letter that a control character has in a text.
+fn named(unit: u16) -> Option<char> {
+    Some(match unit {
+        0x09 => 't',
+        0x0A => 'N',
+        0x0C => 'p',
+        0x0D => 'R',
+        _ => return None,
+    })
+}
+
 fn real(text: &str) -> String {
     match text.split_once('e') {
         Some((digits, exponent)) if !digits.contains('.') => format!("{digits}.0e{exponent}"),
         None if !text.contains('.') => format!("{text}.0"),
         _ => text.to_string(),
     }
-}
-
-fn quoted(bytes: &[u8]) -> String {
-    let mut text = String::from("'");
-    for byte in bytes {
-        match byte {
-            b'\'' => text.push_str("$'"),
-            b'$' => text.push_str("$$"),
-            32..=126 => text.push(char::from(*byte)),
-            _ => drop(write!(text, "${byte:02X}")),
-        }
-    }
-    text + "'"
 }

@@ -4,8 +4,8 @@ use super::functions::Function;
 use super::moments;
 use super::tree::{Kind, Value};
 
-/// The bytes `from..from + count` by a 1-based position, clamped to the string.
-fn span(text: &[u8], count: i128, position: i128) -> (usize, usize) {
+/// The units `from..from + count` by a 1-based position, clamped to the string.
+fn span(text: &[u16], count: i128, position: i128) -> (usize, usize) {
     let start = (position - 1).clamp(0, text.len() as i128) as usize;
     let count = count.clamp(0, (text.len() - start) as i128) as usize;
     (start, start + count)
@@ -19,7 +19,7 @@ pub(super) fn function(function: Function, values: &[Value]) -> Option<Value> {
     Some(Value::Str(match function {
         Function::Len => return Some(Value::Int(text.len() as i128)),
         Function::Find => {
-            let wanted = values[1].bytes();
+            let wanted = values[1].units();
             let found = text.windows(wanted.len().max(1)).position(|window| window == wanted);
             return Some(Value::Int(found.map_or(0, |at| at as i128 + 1)));
         }
@@ -29,10 +29,10 @@ pub(super) fn function(function: Function, values: &[Value]) -> Option<Value> {
             let (from, to) = span(text, number(1), number(2));
             text[from..to].to_vec()
         }
-        Function::Concat => values.iter().flat_map(|value| value.bytes().to_vec()).collect(),
+        Function::Concat => values.iter().flat_map(|value| value.units().to_vec()).collect(),
         Function::Insert => {
             let at = clamped(2);
-            [&text[..at], values[1].bytes(), &text[at..]].concat()
+            [&text[..at], values[1].units(), &text[at..]].concat()
         }
         Function::Delete => {
             let (from, to) = span(text, number(1), number(2));
@@ -40,7 +40,7 @@ pub(super) fn function(function: Function, values: &[Value]) -> Option<Value> {
         }
         Function::Replace => {
             let (from, to) = span(text, number(2), number(3));
-            [&text[..from], values[1].bytes(), &text[to..]].concat()
+            [&text[..from], values[1].units(), &text[to..]].concat()
         }
         _ => return None,
     }))
@@ -88,9 +88,15 @@ fn duration(nanoseconds: i128) -> String {
     format!("T#{sign}{text}")
 }
 
-/// `x_TO_STRING`.
+/// `WSTRING_TO_STRING`: a unit that is not Latin-1 becomes `?`.
 #[must_use]
-pub fn write(kind: Kind, value: &Value) -> Vec<u8> {
+pub fn narrow(units: &[u16]) -> Vec<u8> {
+    units.iter().map(|unit| u8::try_from(*unit).unwrap_or(b'?')).collect()
+}
+
+/// `x_TO_STRING` and `x_TO_WSTRING`.
+#[must_use]
+pub fn write(kind: Kind, value: &Value) -> Vec<u16> {
     let text = match value {
         Value::Real(value) => float(f64::from(*value), &format!("{value}"), &format!("{value:e}")),
         Value::Lreal(value) => float(*value, &format!("{value}"), &format!("{value:e}")),
@@ -106,7 +112,7 @@ pub fn write(kind: Kind, value: &Value) -> Vec<u8> {
         }
         _ => value.int().to_string(),
     };
-    text.into_bytes()
+    text.bytes().map(u16::from).collect()
 }
 
 /// The longest prefix that is a decimal number with fraction and exponent, or the name of what has no digits.

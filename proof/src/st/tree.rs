@@ -211,8 +211,33 @@ pub enum Ty {
     K(Kind),
     /// STRING of a capacity.
     S(u16),
+    /// WSTRING of a capacity.
+    W(u16),
     /// A position in [`Source::types`].
     N(usize),
+}
+
+impl Ty {
+    /// STRING or WSTRING of a capacity.
+    #[must_use]
+    pub fn text(wide: bool, capacity: u16) -> Ty {
+        if wide { Ty::W(capacity) } else { Ty::S(capacity) }
+    }
+
+    /// How many units a STRING or WSTRING holds; of others none.
+    #[must_use]
+    pub fn capacity(self) -> Option<u16> {
+        match self {
+            Ty::S(capacity) | Ty::W(capacity) => Some(capacity),
+            Ty::K(_) | Ty::N(_) => None,
+        }
+    }
+
+    /// WSTRING.
+    #[must_use]
+    pub fn is_wide(self) -> bool {
+        matches!(self, Ty::W(_))
+    }
 }
 
 /// A value of any type.
@@ -224,8 +249,8 @@ pub enum Value {
     Real(f32),
     /// LREAL.
     Lreal(f64),
-    /// STRING.
-    Str(Vec<u8>),
+    /// STRING, whose units are Latin-1, and WSTRING, whose units are UTF-16.
+    Str(Vec<u16>),
     /// Elements of an array in memory order, fields of a structure, variables of a block.
     Many(Vec<Value>),
 }
@@ -243,14 +268,14 @@ impl Value {
         }
     }
 
-    /// The bytes of a string.
+    /// The units of a string.
     ///
     /// # Panics
     /// On another value: the tree is wrong.
     #[must_use]
-    pub fn bytes(&self) -> &[u8] {
+    pub fn units(&self) -> &[u16] {
         match self {
-            Value::Str(bytes) => bytes,
+            Value::Str(units) => units,
             other => panic!("a string is wanted, not {other:?}"),
         }
     }
@@ -573,7 +598,7 @@ impl Source {
             Ty::K(Kind::Real) => Value::Real(0.0),
             Ty::K(Kind::Lreal) => Value::Lreal(0.0),
             Ty::K(_) => Value::Int(0),
-            Ty::S(_) => Value::Str(Vec::new()),
+            Ty::S(_) | Ty::W(_) => Value::Str(Vec::new()),
             Ty::N(id) => match &self.types[id].def {
                 Def::Struct(fields) => {
                     let value =

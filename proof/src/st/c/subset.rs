@@ -48,7 +48,7 @@ pub(super) fn is_type(source: &Source, ty: Ty) -> bool {
             Def::Enum(..) => true,
             Def::Block(_) | Def::Standard(_) => false,
         },
-        Ty::S(_) => false,
+        Ty::S(_) | Ty::W(_) => false,
     }
 }
 
@@ -147,7 +147,7 @@ impl Subset<'_> {
         match ty {
             Ty::K(_) => true,
             Ty::N(id) => matches!(self.source.types[id].def, Def::Enum(..)),
-            Ty::S(_) => false,
+            Ty::S(_) | Ty::W(_) => false,
         }
     }
 }
