@@ -64,6 +64,8 @@ fn literal(of: Of, value: &Value) -> String {
             format!("{}#{sign}{}ns", of.name(), value.unsigned_abs())
         }
         Value::Int(value) => match of {
+            Of::Kind(Kind::Char) => format!("CHAR#'${value:02X}'"),
+            Of::Kind(Kind::Wchar) => format!("WCHAR#\"${value:04X}\""),
             Of::Kind(kind) if kind.is_moment() => {
                 format!("{}#{}", kind.name(), khz_proof::st::moments::text(kind, *value))
             }

@@ -64,7 +64,13 @@ fn covers_the_language(tally: &Tally) {
     for from in Kind::ALL {
         for to in Kind::ALL.into_iter().filter(|to| *to != from) {
             let names = (from.name().to_string(), to.name().to_string());
-            assert!(conversions.contains_key(&(names.0, names.1, false)), "no {}_TO_{}", from.name(), to.name());
+            assert_eq!(
+                conversions.contains_key(&(names.0, names.1, false)),
+                from.converts(to),
+                "no {}_TO_{}",
+                from.name(),
+                to.name()
+            );
             let becomes = tally.coverage.widenings.contains_key(&(from, to));
             assert!(becomes || !from.becomes(to), "no {} becomes a {}", from.name(), to.name());
         }

@@ -164,6 +164,8 @@ fn same(source: &Source, ty: Ty, wanted: &Value, got: &VariableValue) -> bool {
         (Value::Lreal(a), VariableValue::Lreal(b)) => a.to_bits() == b.to_bits(),
         (Value::Str(a), VariableValue::String(b)) => a.iter().copied().eq(b.iter().copied().map(u16::from)),
         (Value::Str(a), VariableValue::WideString(b)) => a == b,
+        (Value::Int(a), VariableValue::String(b)) => matches!(b[..], [b] if *a == i128::from(b)),
+        (Value::Int(a), VariableValue::WideString(b)) => matches!(b[..], [b] if *a == i128::from(b)),
         (Value::Int(a), VariableValue::Named(name)) => match ty {
             Ty::N(id) => match &source.types[id].def {
                 Def::Enum(_, values) => values

@@ -262,17 +262,23 @@ impl Generator {
         let results: Vec<Kind> =
             results.filter_map(|unit| unit.vars.first().and_then(|var| result(var.class, var.ty))).collect();
         let wanted = self.r.pick(&results).copied();
-        if let Some(result) = wanted.filter(|from| *from != kind && self.r.chance(50))
+        if let Some(result) = wanted.filter(|from| *from != kind && from.converts(kind) && self.r.chance(50))
             && let Some(call) = self.call(Ty::K(result), depth)
         {
             return wrap(call);
         }
-        if from == kind {
+        if from == kind || !from.converts(kind) {
             return self.leaf(kind);
         }
         let inner = self.expr(from, depth);
         let cut = from.is_real() && kind.is_integer() && self.r.chance(40);
         if cut { Expr { ty: Ty::K(kind), kind: ExprKind::Trunc(boxed(inner)) } } else { wrap(inner) }
+    }
+
+    /// A CHAR where a STRING is wanted, or a WCHAR where a WSTRING is.
+    pub(super) fn characters(&mut self, wide: bool, depth: usize) -> Expr {
+        let inner = self.expr(if wide { Kind::Wchar } else { Kind::Char }, depth);
+        Expr { ty: Ty::text(wide, 1), kind: ExprKind::Widen(boxed(inner)) }
     }
 
     /// A STRING or a WSTRING.
@@ -318,6 +324,7 @@ impl Generator {
             inputs.push(match found.parameters[at.min(last)].class {
                 TypeClass::Bool => self.expr(Kind::Bool, d),
                 TypeClass::Count => self.count(9, d),
+                TypeClass::AnyChars if self.r.chance(20) => self.characters(wide, 0),
                 _ => self.string(wide, if at == 0 { d.min(1) } else { 0 }),
             });
         }

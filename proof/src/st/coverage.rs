@@ -13,11 +13,12 @@ use khz_machine::library::functions::{ResultRule, TABLE};
 
 /// Everything of the language that is no function, block, conversion or operator. A program with one that does not stand here is a panic, and a search of some
 /// size has to reach each of them.
-pub const FEATURES: [&str; 50] = [
+pub const FEATURES: [&str; 52] = [
     "=>",
     "ARRAY",
     "AT",
     "CASE",
+    "CHAR to STRING",
     "CONFIGURATION",
     "CONTINUE",
     "EN",
@@ -39,6 +40,7 @@ pub const FEATURES: [&str; 50] = [
     "VAR_IN_OUT argument",
     "VAR_OUTPUT",
     "VAR_TEMP",
+    "WCHAR to WSTRING",
     "WHILE",
     "WITH",
     "argument",
@@ -137,6 +139,8 @@ impl Found {
                 ExprKind::Widen(inner) => {
                     if let (Ty::K(from), Ty::K(to)) = (inner.ty, expr.ty) {
                         self.widenings.insert((from, to));
+                    } else {
+                        self.features.insert(if expr.ty.is_wide() { "WCHAR to WSTRING" } else { "CHAR to STRING" });
                     }
                 }
                 ExprKind::Bin(op, left, _) => drop(self.operators.insert((*op, name(source, left.ty)))),

@@ -49,6 +49,27 @@ pub struct Evaluator<'s> {
     trapped_at: Vec<Key>,
 }
 
+/// A value as one of another type.
+fn converted(from: Ty, to: Ty, value: Value, cut: bool) -> Value {
+    let kind = |ty: Ty| if let Ty::K(kind) = ty { kind } else { Kind::Lint };
+    match (from, to) {
+        (Ty::S(_) | Ty::W(_), Ty::K(to)) => text::read(to, value.units()),
+        (Ty::S(_), Ty::S(_)) | (Ty::S(_) | Ty::W(_), Ty::W(_)) => value,
+        (Ty::W(_), Ty::S(_)) => Value::Str(text::narrow(value.units()).into_iter().map(u16::from).collect()),
+        (from, Ty::S(capacity)) => {
+            let mut text = text::write(kind(from), &value);
+            text.truncate(usize::from(capacity));
+            Value::Str(text::narrow(&text).into_iter().map(u16::from).collect())
+        }
+        (from, Ty::W(capacity)) => {
+            let mut text = text::write(kind(from), &value);
+            text.truncate(usize::from(capacity));
+            Value::Str(text)
+        }
+        (from, to) => convert(kind(from), kind(to), &value, cut),
+    }
+}
+
 impl<'s> Evaluator<'s> {
     /// A program before its first scan; `limit` bounds the steps of each.
     #[must_use]
@@ -285,19 +306,7 @@ impl<'s> Evaluator<'s> {
             ExprKind::Not(inner) => complement(kind(inner.ty), &self.expr(context, inner)?),
             ExprKind::Widen(inner) | ExprKind::Conv(inner) | ExprKind::Trunc(inner) => {
                 let value = self.expr(context, inner)?;
-                match (inner.ty, expr.ty) {
-                    (Ty::S(_) | Ty::W(_), Ty::K(to)) => text::read(to, &text::narrow(value.units())),
-                    (Ty::S(_) | Ty::W(_), Ty::W(_)) => value,
-                    (Ty::S(_) | Ty::W(_), Ty::S(_)) => {
-                        Value::Str(text::narrow(value.units()).into_iter().map(u16::from).collect())
-                    }
-                    (from, Ty::S(capacity) | Ty::W(capacity)) => {
-                        let mut text = text::write(kind(from), &value);
-                        text.truncate(usize::from(capacity));
-                        Value::Str(text)
-                    }
-                    (from, to) => convert(kind(from), kind(to), &value, matches!(expr.kind, ExprKind::Trunc(_))),
-                }
+                converted(inner.ty, expr.ty, value, matches!(expr.kind, ExprKind::Trunc(_)))
             }
             ExprKind::Std(function, inputs) => {
                 let values = inputs.iter().map(|input| self.expr(context, input)).collect::<Result<Vec<_>, _>>()?;
@@ -461,8 +470,8 @@ impl<'s> Evaluator<'s> {
                 }
                 let found = self.call_function(context, *unit, args, Key::of_expr(call))?;
                 match (self.source.plain(call.ty), value.ty) {
-                    (Ty::K(from), Ty::K(to)) => convert(from, to, &found, false),
-                    _ => found,
+                    (Ty::N(_), _) | (_, Ty::N(_)) => found,
+                    (from, to) => converted(from, to, found, false),
                 }
             }
             _ => {

@@ -40,6 +40,10 @@ impl Generator {
                 };
                 Value::Int(moments::sayable(kind, if self.r.chance(25) { any } else { value }))
             }
+            Kind::Char | Kind::Wchar if self.r.chance(75) => {
+                let unit = self.text(kind == Kind::Wchar, 1).first().copied();
+                Value::Int(i128::from(unit.unwrap_or(u16::from(b'a'))))
+            }
             _ => Value::Int(kind.wrap(i128::from(self.r.integer(64)))),
         }
     }
@@ -68,6 +72,7 @@ impl Generator {
                 }
                 Some(self.expr(kind, depth))
             }
+            Ty::S(_) | Ty::W(_) if self.r.chance(15) => Some(self.characters(ty.is_wide(), depth)),
             Ty::S(_) | Ty::W(_) => Some(self.string(ty.is_wide(), depth)),
             Ty::N(id) => match self.source.types[id].def.clone() {
                 Def::Enum(_, values) => Some(self.enumerated(ty, &values, depth)),
@@ -193,7 +198,7 @@ impl Generator {
         match kind {
             Kind::Bool => self.truth(d),
             Kind::Time | Kind::Ltime => self.duration(kind, d),
-            Kind::Date | Kind::Ldate => self.function(kind, d),
+            Kind::Date | Kind::Ldate | Kind::Char | Kind::Wchar => self.function(kind, d),
             _ if kind.is_moment() => {
                 let op = self.r.one_of([Op::Add, Op::Sub]);
                 let (left, right) = self.with_duration(kind, d);
@@ -335,7 +340,8 @@ impl Generator {
             4 => {
                 let op = self.r.one_of(compare);
                 let wide = self.r.chance(40);
-                let (left, right) = (self.string(wide, depth), self.string(wide, depth));
+                let left = self.string(wide, depth);
+                let right = if self.r.chance(20) { self.characters(wide, depth) } else { self.string(wide, depth) };
                 wrap(ExprKind::Bin(op, boxed(left), boxed(right)))
             }
             5 => {

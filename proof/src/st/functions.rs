@@ -22,11 +22,11 @@ pub fn takes(class: TypeClass, kind: Kind) -> bool {
     match class {
         TypeClass::AnyElementary => true,
         // Dates and times of day are summed with durations only.
-        TypeClass::AnyMagnitude => kind != Kind::Bool && !kind.is_moment(),
+        TypeClass::AnyMagnitude => kind != Kind::Bool && !kind.is_moment() && !kind.is_character(),
         TypeClass::AnyNum => kind.is_integer() || kind.is_bits() || kind.is_real(),
         TypeClass::AnyReal | TypeClass::Float => kind.is_real(),
         TypeClass::BitString => kind.is_bits(),
-        TypeClass::Bytes => !kind.is_real(),
+        TypeClass::Bytes => !kind.is_real() && !kind.is_character(),
         TypeClass::AnyInt | TypeClass::Shiftable | TypeClass::Count => kind.is_integer() || kind.is_bits(),
         TypeClass::AnyBit => kind == Kind::Bool || kind.is_integer() || kind.is_bits(),
         TypeClass::Part | TypeClass::FinePart => kind.is_integer(),
@@ -174,6 +174,9 @@ pub fn convert(from: Kind, to: Kind, value: &Value, cut: bool) -> Value {
             }
             (None, None) => {}
         }
+    }
+    if (from, to) == (Kind::Wchar, Kind::Char) {
+        return Value::Int(i128::from(super::text::narrow(&[value.int() as u16])[0]));
     }
     match (float, to) {
         (Some(value), Kind::Bool) => Value::Int(i128::from(value != 0.0)),

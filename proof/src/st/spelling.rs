@@ -114,6 +114,9 @@ impl Style {
             (Ty::K(kind), Value::Int(value)) if kind.is_duration() => return self.time(kind == Kind::Ltime, *value),
             (Ty::K(kind), Value::Int(value)) if kind.is_moment() => return self.moment(kind, *value),
             (Ty::K(kind), Value::Int(value)) if kind.is_bits() => (kind.name(), format!("16#{value:X}")),
+            (Ty::K(kind), Value::Int(value)) if kind.is_character() => {
+                (kind.name(), self.quoted(kind == Kind::Wchar, &[*value as u16]))
+            }
             (Ty::K(kind), Value::Int(value)) => (kind.name(), self.number(*value)),
             (Ty::K(kind), Value::Real(value)) => (kind.name(), real(&format!("{value:?}"))),
             (Ty::K(kind), Value::Lreal(value)) => (kind.name(), real(&format!("{value:?}"))),

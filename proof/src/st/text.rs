@@ -97,6 +97,11 @@ pub fn narrow(units: &[u16]) -> Vec<u8> {
 /// `x_TO_STRING` and `x_TO_WSTRING`.
 #[must_use]
 pub fn write(kind: Kind, value: &Value) -> Vec<u16> {
+    if kind.is_character() {
+        // Character 0 ends the text that it is in.
+        let unit = value.int() as u16;
+        return if unit == 0 { Vec::new() } else { vec![unit] };
+    }
     let text = match value {
         Value::Real(value) => float(f64::from(*value), &format!("{value}"), &format!("{value:e}")),
         Value::Lreal(value) => float(*value, &format!("{value}"), &format!("{value:e}")),
@@ -160,10 +165,13 @@ fn time(text: &[u8]) -> i128 {
     }
 }
 
-/// `STRING_TO_x`: the longest valid prefix, without one 0.
+/// `STRING_TO_x` and `WSTRING_TO_x`: the longest valid prefix, without one 0; the first character.
 #[must_use]
-pub fn read(kind: Kind, text: &[u8]) -> Value {
+pub fn read(kind: Kind, units: &[u16]) -> Value {
+    let text = &narrow(units)[..];
     match kind {
+        Kind::Char => return Value::Int(text.first().map_or(0, |unit| i128::from(*unit))),
+        Kind::Wchar => return Value::Int(units.first().map_or(0, |unit| i128::from(*unit))),
         Kind::Bool => return Value::Int(i128::from(text.eq_ignore_ascii_case(b"TRUE"))),
         Kind::Real => return Value::Real(decimal(text).parse().unwrap_or(0.0)),
         Kind::Lreal => return Value::Lreal(decimal(text).parse().unwrap_or(0.0)),

@@ -27,11 +27,13 @@ pub enum Kind {
     Ltod,
     Dt,
     Ldt,
+    Char,
+    Wchar,
 }
 
 impl Kind {
     /// All of them.
-    pub const ALL: [Kind; 23] = [
+    pub const ALL: [Kind; 25] = [
         Kind::Bool,
         Kind::Sint,
         Kind::Int,
@@ -55,6 +57,8 @@ impl Kind {
         Kind::Ltod,
         Kind::Dt,
         Kind::Ldt,
+        Kind::Char,
+        Kind::Wchar,
     ];
     /// DATE to LDT.
     pub const MOMENTS: [Kind; 6] = [Kind::Date, Kind::Ldate, Kind::Tod, Kind::Ltod, Kind::Dt, Kind::Ldt];
@@ -67,9 +71,9 @@ impl Kind {
     /// Its keyword.
     #[must_use]
     pub fn name(self) -> &'static str {
-        const NAMES: [&str; 23] = [
+        const NAMES: [&str; 25] = [
             "BOOL", "SINT", "INT", "DINT", "LINT", "USINT", "UINT", "UDINT", "ULINT", "BYTE", "WORD", "DWORD", "LWORD",
-            "REAL", "LREAL", "TIME", "LTIME", "DATE", "LDATE", "TOD", "LTOD", "DT", "LDT",
+            "REAL", "LREAL", "TIME", "LTIME", "DATE", "LDATE", "TOD", "LTOD", "DT", "LDT", "CHAR", "WCHAR",
         ];
         NAMES[self as usize]
     }
@@ -77,8 +81,11 @@ impl Kind {
     /// Width in bits; of BOOL 1.
     #[must_use]
     pub fn bits(self) -> u32 {
-        if self.is_moment() {
-            return 64;
+        match self {
+            Kind::Char => return 8,
+            Kind::Wchar => return 16,
+            _ if self.is_moment() => return 64,
+            _ => {}
         }
         [1, 8, 16, 32, 64, 8, 16, 32, 64, 8, 16, 32, 64, 32, 64, 64, 64][self as usize]
     }
@@ -133,6 +140,19 @@ impl Kind {
     #[must_use]
     pub fn is_moment(self) -> bool {
         Kind::MOMENTS.contains(&self)
+    }
+
+    /// CHAR and WCHAR, whose values are their codes.
+    #[must_use]
+    pub fn is_character(self) -> bool {
+        matches!(self, Kind::Char | Kind::Wchar)
+    }
+
+    /// Whether `A_TO_B` exists. Characters are converted to and from strings, each other and whole numbers only.
+    #[must_use]
+    pub fn converts(self, to: Kind) -> bool {
+        let fits = |kind: Kind| kind.is_character() || kind.is_integer() || kind.is_bits();
+        !(self.is_character() || to.is_character()) || (fits(self) && fits(to))
     }
 
     /// The L-form of a duration, date or time of day; of an L-form itself.
@@ -243,7 +263,7 @@ impl Ty {
 /// A value of any type.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Value {
-    /// BOOL, integers, bit strings, enumerations, TIME in nanoseconds.
+    /// BOOL, integers, bit strings, enumerations, codes of characters, TIME in nanoseconds.
     Int(i128),
     /// REAL.
     Real(f32),
