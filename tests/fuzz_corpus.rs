@@ -21,8 +21,8 @@ use khz_proof::harness::programs;
 /// Most bytes of a mutant.
 const MOST_BYTES: usize = 1 << 16;
 
-fn corpus(target: &str) -> PathBuf {
-    root().join("fuzz/corpus").join(target)
+fn corpus(folder: &str) -> PathBuf {
+    root().join("fuzz/corpus").join(folder)
 }
 
 /// Every file of a folder, by name.
@@ -60,6 +60,12 @@ fn target(name: &str) -> &'static Target {
     TARGETS.iter().find(|target| target.name == name).expect("a target")
 }
 
+/// Runs a target on its corpus.
+fn run_corpus(name: &str, mutants: u32) {
+    let target = target(name);
+    run(target, &all(&corpus(target.corpus)), mutants);
+}
+
 #[test]
 fn sources() {
     // Those of the conformance suite are many; `proof/tests/mutants.rs` has them.
@@ -74,27 +80,33 @@ fn sources() {
 
 #[test]
 fn containers_through_the_reader() {
-    run(target("container_reader"), &all(&corpus("container_reader")), 100);
+    run_corpus("container_reader", 100);
 }
 
 #[test]
 fn containers_through_the_verifier() {
-    run(target("verifier"), &all(&corpus("verifier")), 60);
+    run_corpus("verifier", 60);
 }
 
 #[test]
 fn containers_in_both_engines() {
-    run(target("verified_execution"), &all(&corpus("verified_execution")), 12);
+    run_corpus("verified_execution", 12);
 }
 
 #[test]
 fn tables_of_inputs() {
-    run(target("csv"), &all(&corpus("csv")), 300);
+    run_corpus("csv", 300);
+}
+
+#[test]
+fn traces_and_mappings() {
+    run_corpus("trace", 300);
+    run_corpus("mapping", 300);
 }
 
 #[test]
 fn project_files() {
-    run(target("toml"), &all(&corpus("toml")), 300);
+    run_corpus("toml", 300);
 }
 
 /// Small containers of many forms: what the assembly texts say, and some programs, of which one is stripped.
@@ -121,40 +133,41 @@ fn seeds() -> Vec<(String, Container)> {
 
 #[test]
 fn containers_of_the_corpus_are_sound() {
-    let targets = ["container_reader", "verifier", "verified_execution"];
+    let folder = corpus("containers");
     if std::env::var_os("KHZ_BLESS").is_some() {
-        for target in targets {
-            std::fs::create_dir_all(corpus(target)).expect("a folder");
-            for (name, container) in seeds() {
-                let bytes = write(&container).expect("a container that can be written");
-                std::fs::write(corpus(target).join(name).with_extension("iplc"), bytes).expect("a file");
-            }
+        std::fs::create_dir_all(&folder).expect("a folder");
+        for (name, container) in seeds() {
+            let bytes = write(&container).expect("a container that can be written");
+            std::fs::write(folder.join(name).with_extension("iplc"), bytes).expect("a file");
         }
     }
-    let names: Vec<String> = seeds().into_iter().map(|(name, _)| name).collect();
-    for target in targets {
-        for name in &names {
-            let path = corpus(target).join(name).with_extension("iplc");
-            let bytes = std::fs::read(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
-            let container = read(&bytes).unwrap_or_else(|e| panic!("{}: {e}: KHZ_BLESS=1", path.display()));
-            verify(container).unwrap_or_else(|e| panic!("{}: {e}: KHZ_BLESS=1", path.display()));
-        }
+    for (name, _) in seeds() {
+        let path = folder.join(name).with_extension("iplc");
+        let bytes = std::fs::read(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+        let container = read(&bytes).unwrap_or_else(|e| panic!("{}: {e}: KHZ_BLESS=1", path.display()));
+        verify(container).unwrap_or_else(|e| panic!("{}: {e}: KHZ_BLESS=1", path.display()));
     }
 }
 
 #[test]
 fn every_target_has_a_body_a_file_and_a_corpus() {
-    let named: Vec<String> = TARGETS.iter().map(|target| target.name.to_string()).collect();
     let manifest = std::fs::read_to_string(root().join("fuzz/Cargo.toml")).expect("the manifest");
     let mut bytes = 0;
-    for name in &named {
+    let mut folders: Vec<&str> = TARGETS.iter().map(|target| target.corpus).collect();
+    folders.sort_unstable();
+    folders.dedup();
+    for Target { name, .. } in TARGETS {
         assert!(root().join("fuzz/fuzz_targets").join(name).with_extension("rs").is_file(), "{name} has no file");
         assert!(manifest.contains(&format!("name = \"{name}\"")), "{name} is not in the manifest");
+    }
+    let there = std::fs::read_dir(corpus("")).expect("the corpus").count();
+    assert_eq!(there, folders.len(), "a folder of the corpus that no target has");
+    for name in folders {
         let corpus = all(&corpus(name));
         assert!(corpus.len() >= 5, "{name} has a corpus of {}", corpus.len());
         bytes += corpus.iter().map(|(_, bytes)| bytes.len()).sum::<usize>();
     }
     let targets = files(&root().join("fuzz/fuzz_targets"), "rs");
-    assert_eq!(targets.len(), named.len(), "a target without a body: {targets:?}");
+    assert_eq!(targets.len(), TARGETS.len(), "a target without a body: {targets:?}");
     assert!(bytes < 1 << 20, "the corpus has {bytes} bytes");
 }

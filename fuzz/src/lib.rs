@@ -26,14 +26,17 @@ use kilohertz::khz_proof::random::Random;
 use kilohertz::khz_proof::statistics::Statistics;
 use kilohertz::khz_scheduler::InputSource;
 use kilohertz::pipeline::{self, EngineKind, Program, Refused};
+use kilohertz::traces::{Choice, MAX_CELLS, Mapping, Trace, TraceError};
 
 /// Largest memory image of a program that is run, in bytes.
 const MAX_IMAGE_BYTES: u64 = 1 << 16;
 
 /// A fuzz target.
 pub struct Target {
-    /// Its name: of the file in `fuzz_targets/` and of the folder in `corpus/`.
+    /// Its name: of the file in `fuzz_targets/`.
     pub name: &'static str,
+    /// The folder in `corpus/`; targets of the same bytes share one.
+    pub corpus: &'static str,
     /// What it does with some bytes.
     pub body: fn(&[u8]),
     /// Makes other bytes of some.
@@ -42,12 +45,14 @@ pub struct Target {
 
 /// Every target.
 pub const TARGETS: &[Target] = &[
-    Target { name: "source", body: source, mutated: mutated_text },
-    Target { name: "container_reader", body: container_reader, mutated: mutated_container },
-    Target { name: "verifier", body: verifier, mutated: mutated_container },
-    Target { name: "verified_execution", body: verified_execution, mutated: mutated_container },
-    Target { name: "csv", body: csv, mutated: mutated_text },
-    Target { name: "toml", body: toml, mutated: mutated_text },
+    Target { name: "source", corpus: "source", body: source, mutated: mutated_text },
+    Target { name: "container_reader", corpus: "containers", body: container_reader, mutated: mutated_container },
+    Target { name: "verifier", corpus: "containers", body: verifier, mutated: mutated_container },
+    Target { name: "verified_execution", corpus: "containers", body: verified_execution, mutated: mutated_container },
+    Target { name: "csv", corpus: "csv", body: csv, mutated: mutated_text },
+    Target { name: "trace", corpus: "trace", body: trace, mutated: mutated_text },
+    Target { name: "mapping", corpus: "mapping", body: mapping, mutated: mutated_text },
+    Target { name: "toml", corpus: "toml", body: toml, mutated: mutated_text },
 ];
 
 fn source_of(bytes: &[u8]) -> SourceInput {
@@ -217,6 +222,52 @@ pub fn csv(bytes: &[u8]) {
         last = time_us;
         inputs.apply(time_us, &mut image);
         assert!(inputs.next_change_us().is_none_or(|next| next > time_us), "a row was not applied");
+    }
+}
+
+fn has_a_place(error: &TraceError) {
+    assert!(
+        error.line > 0 && error.column != Some(0) && !error.reason.is_empty(),
+        "an error without a place: {error:?}"
+    );
+}
+
+/// A trace that is read has rows in the order of time, and every cell of it can be asked for.
+fn is_sound(trace: &Trace) {
+    assert!(!trace.is_empty() && trace.lines.len() == trace.len() && !trace.columns.is_empty(), "{trace:?}");
+    assert!(trace.times_us.is_sorted_by(|a, b| a < b) && trace.lines.is_sorted_by(|a, b| a < b), "time goes back");
+    assert!(trace.len() * trace.columns.len() <= MAX_CELLS, "more cells than a trace may have");
+    for column in 0..trace.columns.len() {
+        // A number is a number, whatever the cell says.
+        let _ = (0..trace.len()).filter_map(|row| trace.cell(row, column).number()).fold(0.0, f64::max);
+    }
+}
+
+/// A trace: refused with a place, or sound; with columns that drive the program and without.
+pub fn trace(bytes: &[u8]) {
+    let (names, image) = columns();
+    for drive in [None, Some(vec!["main.n".to_string(), "main.s".to_string()])] {
+        let choice = Choice { mapping: Mapping::default(), drive };
+        match Trace::read("trace.csv", bytes, &choice, names, image) {
+            Ok(trace) => is_sound(&trace),
+            Err(error) => has_a_place(&error),
+        }
+    }
+}
+
+/// The trace that mappings are for.
+const MAPPED: &str = "time_us,x,n,r,speed,stamp\n0,1,2,1.5,30000,T#1s\n10,0,,-0.25,-3,1000\n1000,1,7,NaN,1e3,\n";
+
+/// A `--map` file: refused with a place, or what it says of a trace is.
+pub fn mapping(bytes: &[u8]) {
+    let (names, image) = columns();
+    let mapping = match Mapping::read("map.csv", bytes) {
+        Ok(mapping) => mapping,
+        Err(error) => return has_a_place(&error),
+    };
+    match Trace::read("trace.csv", MAPPED.as_bytes(), &Choice { mapping, drive: None }, names, image) {
+        Ok(trace) => is_sound(&trace),
+        Err(error) => has_a_place(&error),
     }
 }
 

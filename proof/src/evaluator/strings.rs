@@ -248,10 +248,13 @@ mod tests {
                     values.push(random_value(&mut random, *ty));
                     continue;
                 }
+                // Characters of two bytes stand on even addresses.
+                image.resize(image.len().next_multiple_of(2), 0_u8);
                 places.push(StringPlace { at: image.len() as u32, capacity: CAPACITY });
-                let mut bytes = random_text(&mut random);
-                bytes.resize(usize::from(CAPACITY) + 1, 0);
-                image.extend(bytes);
+                let mut text = random_text(&mut random);
+                text.resize(usize::from(CAPACITY) + 1, 0);
+                let unit = if operand.is_wide() { 2 } else { 1 };
+                image.extend(text.iter().flat_map(|byte| u16::from(*byte).to_le_bytes().into_iter().take(unit)));
             }
             let (before, mut theirs) = (image.clone(), image.clone());
             let ours = apply(op, &mut image, &places, &values);
