@@ -13,6 +13,7 @@ use crate::st::position::Positions;
 use crate::st::print::{print, print_positions};
 use crate::st::rounds::Rounds;
 use crate::st::shrink::shrink;
+use crate::st::text::text_in;
 use crate::st::tree::{Def, Source, Ty, Value};
 use crate::st::{Size, generate};
 use khz_bytecode::container::{Container, SystemVariableKind, TaskType};
@@ -162,8 +163,8 @@ fn same(source: &Source, ty: Ty, wanted: &Value, got: &VariableValue) -> bool {
         (Value::Real(a), VariableValue::Real(b)) => a.to_bits() == b.to_bits(),
         (Value::Lreal(a), VariableValue::Lreal(b)) if a.is_nan() => b.to_bits() == 0xFFF8_0000_0000_0000,
         (Value::Lreal(a), VariableValue::Lreal(b)) => a.to_bits() == b.to_bits(),
-        (Value::Str(a), VariableValue::String(b)) => a.iter().copied().eq(b.iter().copied().map(u16::from)),
-        (Value::Str(a), VariableValue::WideString(b)) => a == b,
+        (Value::Str(a), VariableValue::String(b)) => text_in(a).iter().copied().eq(b.iter().copied().map(u16::from)),
+        (Value::Str(a), VariableValue::WideString(b)) => text_in(a) == b,
         (Value::Int(a), VariableValue::String(b)) => matches!(b[..], [b] if *a == i128::from(b)),
         (Value::Int(a), VariableValue::WideString(b)) => matches!(b[..], [b] if *a == i128::from(b)),
         (Value::Int(a), VariableValue::Named(name)) => match ty {

@@ -112,23 +112,30 @@ impl Settler<'_> {
             Base::Direct(_) => return,
         };
         for step in &mut place.steps {
+            if let (Step::Index(indices), Some(capacity)) = (&mut *step, ty.capacity()) {
+                self.index(&mut indices[0], 1, i128::from(capacity));
+                return;
+            }
             let Ty::N(id) = ty else { return };
             match (step, &self.source.types[id].def) {
                 (Step::Field(at), def) => ty = self.source.field_type(def, *at),
                 (Step::Index(indices), Def::Array(dims, element)) => {
                     for (index, (low, high)) in indices.iter_mut().zip(dims) {
-                        let (low, high) = (i128::from(*low), i128::from(*high));
-                        if let Some(Value::Int(known)) = self.value(index)
-                            && !(low..=high).contains(&known)
-                        {
-                            *index = Expr { ty: Ty::K(Kind::Dint), kind: ExprKind::Lit(Value::Int(low), false) };
-                            self.count += 1;
-                        }
+                        self.index(index, i128::from(*low), i128::from(*high));
                     }
                     ty = *element;
                 }
                 _ => return,
             }
+        }
+    }
+
+    fn index(&mut self, index: &mut Expr, low: i128, high: i128) {
+        if let Some(Value::Int(known)) = self.value(index)
+            && !(low..=high).contains(&known)
+        {
+            *index = Expr { ty: Ty::K(Kind::Dint), kind: ExprKind::Lit(Value::Int(low), false) };
+            self.count += 1;
         }
     }
 

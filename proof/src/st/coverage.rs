@@ -13,7 +13,7 @@ use khz_machine::library::functions::{ResultRule, TABLE};
 
 /// Everything of the language that is no function, block, conversion or operator. A program with one that does not stand here is a panic, and a search of some
 /// size has to reach each of them.
-pub const FEATURES: [&str; 52] = [
+pub const FEATURES: [&str; 53] = [
     "=>",
     "ARRAY",
     "AT",
@@ -49,6 +49,7 @@ pub const FEATURES: [&str; 52] = [
     "assignment of a whole",
     "bit access",
     "block call",
+    "character of a string",
     "composite result",
     "connection",
     "direct address",
@@ -164,8 +165,12 @@ impl Found {
                 if located {
                     self.features.insert(if matches!(place.base, Base::Direct(_)) { "direct address" } else { "AT" });
                 }
+                let mut ty = source.base(&source.units[unit], place);
                 for step in &place.steps {
+                    let whole = ty;
+                    ty = source.behind(whole, step);
                     self.features.insert(match step {
+                        Step::Index(_) if whole.capacity().is_some() => "character of a string",
                         Step::Field(_) => "field",
                         Step::Index(indices) if indices.len() > 1 => "element of several dimensions",
                         Step::Index(_) => "element",

@@ -206,7 +206,7 @@ impl<'s> Evaluator<'s> {
         let unit = &self.source.units[context.unit];
         for (at, var) in unit.vars.iter().enumerate().filter(|(_, var)| var.class == Class::Temp) {
             let first = self.source.first(var);
-            self.memory.write(&context.me.child(at), first);
+            *self.memory.at(&context.me.child(at)) = first;
         }
         self.list(context, &unit.body).map(|_| ())
     }
@@ -238,6 +238,12 @@ impl<'s> Evaluator<'s> {
                 found.part = Some((*first, *count, kind));
                 break;
             }
+            if let (Step::Index(indices), Some(capacity)) = (step, ty.capacity()) {
+                let index = self.expr(context, &indices[0])?.int();
+                let position = self.bounded(place, index, 1, i128::from(capacity))?;
+                found.unit = Some(position);
+                break;
+            }
             let Ty::N(id) = ty else { panic!("a step into {ty:?}") };
             match (step, &source.types[id].def) {
                 (Step::Field(at), def) => {
@@ -250,21 +256,25 @@ impl<'s> Evaluator<'s> {
                     let mut position = 0;
                     for (value, (low, high)) in values.iter().map(Value::int).zip(dims) {
                         let (low, high) = (i128::from(*low), i128::from(*high));
-                        if !(low..=high).contains(&value) {
-                            // Bounds are DINT, and a trap shows an index as the nearest DINT.
-                            let shown = value.clamp(i128::from(i32::MIN), i128::from(i32::MAX)) as i64;
-                            let values = [shown, low as i64, high as i64];
-                            return Err(self.trap(Key::of_place(place), TrapCode::ArrayIndex, values));
-                        }
-                        position = position * (high - low + 1) + value - low;
+                        position = position * (high - low + 1) as usize + self.bounded(place, value, low, high)?;
                     }
                     ty = *element;
-                    found.path.push(position as usize);
+                    found.path.push(position);
                 }
                 _ => panic!("a wrong step into {ty:?}"),
             }
         }
         Ok(found)
+    }
+
+    /// How far an index is behind the lower bound.
+    fn bounded(&mut self, place: &Place, index: i128, low: i128, high: i128) -> Result<usize, Stop> {
+        if (low..=high).contains(&index) {
+            return Ok((index - low) as usize);
+        }
+        // Bounds are DINT, and a trap shows an index as the nearest DINT.
+        let shown = index.clamp(i128::from(i32::MIN), i128::from(i32::MAX)) as i64;
+        Err(self.trap(Key::of_place(place), TrapCode::ArrayIndex, [shown, low as i64, high as i64]))
     }
 
     /// Stores a value: strings are cut, subranges checked. `from` is where the value stands in the program.
@@ -387,7 +397,10 @@ impl<'s> Evaluator<'s> {
         self.outputs(context, &me, unit, args)?;
         self.eno(context, args, 1)?;
         let Some(Value::Many(parts)) = self.memory.frames.pop() else { panic!("no frame") };
-        Ok(parts.into_iter().next().unwrap_or(Value::Int(0)))
+        Ok(match parts.into_iter().next() {
+            Some(Value::Str(room)) => Value::Str(text::text_in(&room).to_vec()),
+            found => found.unwrap_or(Value::Int(0)),
+        })
     }
 
     fn outputs(&mut self, context: &Context, me: &Ref, unit: usize, args: &[Arg]) -> Result<(), Stop> {

@@ -1,5 +1,6 @@
 //! Where values live while a tree is run: frames of composed values, and the bytes of the process image.
 
+use super::text::text_in;
 use super::tree::{Area, At, Kind, Value};
 
 /// Bytes of each area that the generator uses.
@@ -16,11 +17,13 @@ pub(super) struct Ref {
     pub image: Option<(At, Kind)>,
     /// Of its bits only some: the first, how many, and the type of all.
     pub part: Option<(u32, u32, Kind)>,
+    /// Of a string only the character at a position from 0.
+    pub unit: Option<usize>,
 }
 
 impl Ref {
     pub(super) fn frame(frame: usize) -> Ref {
-        Ref { frame, path: Vec::new(), image: None, part: None }
+        Ref { frame, path: Vec::new(), image: None, part: None, unit: None }
     }
 
     pub(super) fn image(at: At, kind: Kind) -> Ref {
@@ -50,6 +53,11 @@ fn area(at: At) -> usize {
     }
 }
 
+fn put(room: &mut Vec<u16>, at: usize, units: &[u16]) {
+    room.resize(room.len().max(at + units.len()), 0);
+    room[at..at + units.len()].copy_from_slice(units);
+}
+
 impl Memory {
     pub(super) fn new(frames: Vec<Value>) -> Memory {
         Memory { frames, image: [vec![0; IMAGE_BYTES], vec![0; IMAGE_BYTES], vec![0; IMAGE_BYTES]] }
@@ -64,7 +72,13 @@ impl Memory {
     }
 
     fn whole(&mut self, place: &Ref) -> Value {
-        let Some((at, kind)) = place.image else { return self.at(place).clone() };
+        let Some((at, kind)) = place.image else {
+            return match (&*self.at(place), place.unit) {
+                (Value::Str(room), Some(unit)) => Value::Int(room.get(unit).map_or(0, |unit| i128::from(*unit))),
+                (Value::Str(room), None) => Value::Str(text_in(room).to_vec()),
+                (value, _) => value.clone(),
+            };
+        };
         let bytes = &self.image[area(at)];
         if kind == Kind::Bool {
             return Value::Int(i128::from(bytes[at.byte] >> at.bit & 1));
@@ -92,7 +106,15 @@ impl Memory {
             None => value,
         };
         let Some((at, kind)) = place.image else {
-            *self.at(place) = value;
+            match (self.at(place), place.unit, value) {
+                (Value::Str(room), Some(unit), value) => put(room, unit, &[value.int() as u16]),
+                // What lies behind the 0 that ends it stays.
+                (Value::Str(room), None, Value::Str(mut text)) => {
+                    text.push(0);
+                    put(room, 0, &text);
+                }
+                (found, _, value) => *found = value,
+            }
             return;
         };
         let bytes = &mut self.image[area(at)];

@@ -112,7 +112,25 @@ impl Generator {
         {
             return Some(place);
         }
+        if let Ty::K(kind @ (Kind::Char | Kind::Wchar)) = ty
+            && self.r.chance(40)
+            && let Some(place) = self.character(kind, writes)
+        {
+            return Some(place);
+        }
         self.address_of(ty, writes)
+    }
+
+    /// A character of a string.
+    fn character(&mut self, kind: Kind, writes: bool) -> Option<Place> {
+        let fits = |shape: &Shape| shape.ty.character() == Some(kind) && (!writes || shape.is_writable);
+        let candidates: Vec<usize> = (0..self.shapes.len()).filter(|at| fits(&self.shapes[*at])).collect();
+        let at = *self.r.pick(&candidates)?;
+        let mut place = self.place_at(at)?;
+        let index = self.index(1, i32::from(place.ty.capacity()?));
+        place.steps.push(Step::Index(vec![index]));
+        place.ty = Ty::K(kind);
+        Some(place)
     }
 
     /// A place that has an address: what a VAR_IN_OUT may stand for, if it is no BOOL in the process image.

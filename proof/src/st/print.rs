@@ -235,6 +235,12 @@ impl<'s> Printer<'s> {
                 self.put(&text);
                 break;
             }
+            if let (Step::Index(indices), Some(_)) = (step, ty.capacity()) {
+                self.put("[");
+                self.joined(indices, |_, _| {});
+                self.put("]");
+                break;
+            }
             let Ty::N(id) = ty else { panic!("a step into {ty:?}") };
             match (step, &self.source.types[id].def) {
                 (Step::Field(at), def) => {

@@ -88,6 +88,12 @@ fn duration(nanoseconds: i128) -> String {
     format!("T#{sign}{text}")
 }
 
+/// The text in the room of a string: what is before the first 0.
+#[must_use]
+pub fn text_in(room: &[u16]) -> &[u16] {
+    room.split(|unit| *unit == 0).next().unwrap_or(room)
+}
+
 /// `WSTRING_TO_STRING`: a unit that is not Latin-1 becomes `?`.
 #[must_use]
 pub fn narrow(units: &[u16]) -> Vec<u8> {

@@ -253,6 +253,12 @@ impl Ty {
         }
     }
 
+    /// The type of a string's characters; of others none.
+    #[must_use]
+    pub fn character(self) -> Option<Kind> {
+        self.capacity().map(|_| if self.is_wide() { Kind::Wchar } else { Kind::Char })
+    }
+
     /// WSTRING.
     #[must_use]
     pub fn is_wide(self) -> bool {
@@ -269,7 +275,7 @@ pub enum Value {
     Real(f32),
     /// LREAL.
     Lreal(f64),
-    /// STRING, whose units are Latin-1, and WSTRING, whose units are UTF-16.
+    /// STRING, whose units are Latin-1, and WSTRING, whose units are UTF-16. In a variable a 0 ends it, and what was there before may lie behind that.
     Str(Vec<u16>),
     /// Elements of an array in memory order, fields of a structure, variables of a block.
     Many(Vec<Value>),
@@ -484,7 +490,7 @@ pub enum Base {
 pub enum Step {
     /// Field of a structure or variable of a block.
     Field(usize),
-    /// Element of an array.
+    /// Element of an array, character of a string.
     Index(Vec<Expr>),
     /// Bits of an integer or bit string: the first, and how many (1, 8, 16, 32).
     Part(u32, u32),
@@ -678,6 +684,9 @@ impl Source {
         if let Step::Part(_, count) = step {
             let kinds = [Kind::Bool, Kind::Byte, Kind::Word, Kind::Dword];
             return kinds.into_iter().find(|kind| kind.bits() == *count).map_or(ty, Ty::K);
+        }
+        if let Some(kind) = ty.character() {
+            return Ty::K(kind);
         }
         let Ty::N(id) = ty else { panic!("a step into {ty:?}") };
         match (step, &self.types[id].def) {
