@@ -6,7 +6,8 @@ use super::expression::{boxed, lit};
 use super::functions::{Function, compares, row, takes};
 use super::generate::Generator;
 use super::moments;
-use super::tree::{Class, Expr, ExprKind, Kind, Op, Ty, UnitKind, Value};
+use super::places::is_plain;
+use super::tree::{Arg, Class, Expr, ExprKind, Kind, Op, Stmt, Ty, UnitKind, Value};
 
 /// Whether a function can give a type.
 fn gives(row: &FunctionRow, kind: Kind) -> bool {
@@ -114,6 +115,32 @@ impl Generator {
             });
         }
         std(kind, row.function, inputs)
+    }
+
+    /// A date or time of day into its parts: some of them, mostly in their order.
+    pub(super) fn split(&mut self) -> Option<Stmt> {
+        let rows: Vec<&FunctionRow> = TABLE.iter().filter(|row| moments::splits(row.function).is_some()).collect();
+        let row = self.r.pick(&rows).copied()?;
+        let kind = moments::splits(row.function)?;
+        let mut args = vec![Arg::In(0, self.value(Ty::K(kind), 3)?)];
+        let given = self.r.one_of([30, 60, 100]);
+        for number in 1..=row.outputs.len() {
+            if !self.r.chance(given) {
+                continue;
+            }
+            let was = std::mem::replace(&mut self.is_pure, true);
+            let target = (0..4).find_map(|_| {
+                let kind = self.r.one_of(Kind::INTEGERS);
+                self.place(Ty::K(kind), true).filter(is_plain)
+            });
+            self.is_pure = was;
+            args.extend(target.map(|place| Arg::Out(number, place)));
+        }
+        if self.r.chance(10) {
+            args.reverse();
+        }
+        self.enable(&mut args, 12);
+        Some(Stmt::Split(row.function, args))
     }
 
     /// A year, a month, an hour …, mostly one that there is.

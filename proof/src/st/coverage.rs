@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::functions::row;
 use super::generate::Size;
+use super::moments;
 use super::tree::{Arg, Base, Class, Def, ExprKind, Kind, Op, Source, Step, Stmt, Ty, UnitKind};
 use super::visit::{Node, each};
 use crate::campaign::Figures;
@@ -66,6 +67,7 @@ pub const FEATURES: [&str; 53] = [
     "result",
     "sign",
     "startup function",
+    "statement of a standard function",
     "subrange",
 ];
 
@@ -206,6 +208,12 @@ impl Found {
             Stmt::Call(_, args) | Stmt::Do(_, args) => {
                 self.args(args);
                 if matches!(stmt, Stmt::Do(..)) { "function statement" } else { "block call" }
+            }
+            Stmt::Split(function, args) => {
+                self.args(args);
+                let split = moments::splits(*function).map_or_else(String::new, |kind| kind.name().to_string());
+                self.functions.insert((row(*function).name, split));
+                "statement of a standard function"
             }
             Stmt::Exit => "EXIT",
             Stmt::Continue => "CONTINUE",

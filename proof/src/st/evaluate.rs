@@ -4,8 +4,9 @@ use std::collections::BTreeMap;
 
 use khz_bytecode::trap::TrapCode;
 
-use super::functions::{binary, complement, convert, negate, standard};
+use super::functions::{Function, binary, complement, convert, negate, row, standard};
 use super::memory::{Memory, Ref};
+use super::moments;
 use super::position::Key;
 use super::text;
 use super::tree::{Arg, Base, Class, Def, Expr, ExprKind, Kind, Op, Place, Source, Step, Stmt, Ty, Value};
@@ -459,6 +460,30 @@ impl<'s> Evaluator<'s> {
         self.eno(context, args, 1)
     }
 
+    /// The parts of a date or time of day, which is evaluated once and first; each is stored as it comes.
+    fn split(&mut self, context: &Context, function: Function, args: &[Arg], at: Key) -> Result<(), Stop> {
+        if !self.is_enabled(context, args)? {
+            return Ok(());
+        }
+        let Some(kind) = moments::splits(function) else { panic!("{function:?} splits nothing") };
+        let Some(Arg::In(_, given)) = args.iter().find(|arg| matches!(arg, Arg::In(..))) else {
+            panic!("{function:?} of nothing")
+        };
+        let value = self.expr(context, given)?.int();
+        for arg in args {
+            if let Arg::Out(number, place) = arg {
+                let part = moments::part(kind, value, row(function).outputs[number - 1]);
+                let part = match self.source.plain(place.ty) {
+                    Ty::K(to) => convert(Kind::Lint, to, &Value::Int(part), false),
+                    other => panic!("a part into {other:?}"),
+                };
+                let target = self.place(context, place)?;
+                self.store(&target, place.ty, part, at)?;
+            }
+        }
+        self.eno(context, args, 1)
+    }
+
     fn list(&mut self, context: &Context, list: &[Stmt]) -> Result<Flow, Stop> {
         for stmt in list {
             self.step()?;
@@ -554,6 +579,7 @@ impl<'s> Evaluator<'s> {
                     self.call_function(context, *unit, args, Key::of_stmt(stmt))?;
                 }
             }
+            Stmt::Split(function, args) => self.split(context, *function, args, Key::of_stmt(stmt))?,
             Stmt::Exit => return Ok(Flow::Exit),
             Stmt::Continue => return Ok(Flow::Continue),
             Stmt::Return => return Ok(Flow::Return),

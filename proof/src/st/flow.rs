@@ -129,9 +129,26 @@ impl Flow<'_> {
                 }
                 Stmt::Call(place, args) => self.block(unit, place, args, conditions),
                 Stmt::Do(callee, args) => self.args(unit, &self.source.units[*callee], args),
+                Stmt::Split(_, args) => self.split(unit, args, conditions),
                 Stmt::Exit | Stmt::Continue | Stmt::Return => {}
             }
             bodies(stmt).into_iter().for_each(|body| self.list(unit, body, &inner));
+        }
+    }
+
+    /// What a standard function stores is computed from what it is given.
+    fn split(&mut self, unit: &Unit, args: &[Arg], conditions: &BTreeSet<String>) {
+        let mut read = conditions.clone();
+        for arg in args {
+            if let Arg::In(_, value) | Arg::En(value) = arg {
+                read.extend(self.reads(unit, |see| each_in_expr(value, see)));
+            }
+        }
+        for arg in args {
+            if let Arg::Out(_, place) | Arg::Eno(place) = arg {
+                let name = self.name(unit, place);
+                self.flows(&name, read.iter().cloned());
+            }
         }
     }
 

@@ -163,7 +163,7 @@ impl Generator {
         let nested = usize::from(depth < 3);
         let looping = usize::from(self.loops.len() < 2 && depth < 3);
         let leaving = usize::from(depth > 0);
-        let weights = [40, 10 * nested, 6 * nested, 9 * looping, 4 * looping, 4 * looping, 14, 3 * leaving, 6, 4];
+        let weights = [40, 10 * nested, 6 * nested, 9 * looping, 4 * looping, 4 * looping, 14, 3 * leaving, 6, 4, 3];
         match self.r.weighted(&weights) {
             0 => self.assign(),
             1 => {
@@ -203,7 +203,8 @@ impl Generator {
                 Some(Stmt::If(vec![(condition, vec![leave])], Vec::new()))
             }
             8 => self.copy(),
-            _ => self.call_function(),
+            9 => self.call_function(),
+            _ => self.split(),
         }
     }
 

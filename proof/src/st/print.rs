@@ -406,6 +406,28 @@ impl<'s> Printer<'s> {
         self.put(")");
     }
 
+    /// A call of a standard function with outputs: by position when all before one that is given are given too.
+    fn split(&mut self, function: Function, args: &[Arg]) {
+        let row = row(function);
+        self.put(&format!("{}(", row.name));
+        let is_next = |(wanted, arg): (usize, &Arg)| matches!(arg, Arg::In(at, _) | Arg::Out(at, _) if *at == wanted);
+        if args.iter().enumerate().all(is_next) && self.style.chance(40) {
+            for arg in args {
+                match arg {
+                    Arg::In(_, value) => self.expr(value, 0),
+                    Arg::Out(_, place) => {
+                        self.put(", ");
+                        self.place(place);
+                    }
+                    _ => {}
+                }
+            }
+        } else {
+            self.args(args, &|at| at.checked_sub(1).map_or("IN", |at| row.outputs[at]).to_string());
+        }
+        self.put(")");
+    }
+
     fn args(&mut self, args: &[Arg], name: &dyn Fn(usize) -> String) {
         for (number, arg) in args.iter().enumerate() {
             if number > 0 {
@@ -484,6 +506,10 @@ impl<'s> Printer<'s> {
             }
             Stmt::Do(unit, args) => {
                 self.call_function(*unit, args);
+                self.line(";");
+            }
+            Stmt::Split(function, args) => {
+                self.split(*function, args);
                 self.line(";");
             }
             Stmt::Exit => self.line("EXIT;"),

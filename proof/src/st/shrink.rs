@@ -255,7 +255,13 @@ impl Editor {
                     *limit = 1;
                 }
             }
-            Stmt::Assign(..) | Stmt::Call(..) | Stmt::Do(..) | Stmt::Exit | Stmt::Continue | Stmt::Return => {}
+            Stmt::Assign(..)
+            | Stmt::Call(..)
+            | Stmt::Do(..)
+            | Stmt::Split(..)
+            | Stmt::Exit
+            | Stmt::Continue
+            | Stmt::Return => {}
         }
     }
 
@@ -397,7 +403,7 @@ impl Editor {
                     self.place(place);
                     self.args(args);
                 }
-                Stmt::Do(_, args) => self.args(args),
+                Stmt::Do(_, args) | Stmt::Split(_, args) => self.args(args),
                 Stmt::Exit | Stmt::Continue | Stmt::Return => {}
             }
             if self.done {

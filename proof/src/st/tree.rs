@@ -602,6 +602,8 @@ pub enum Stmt {
     Call(Place, Vec<Arg>),
     /// A call of a function of the program for its effects.
     Do(usize, Vec<Arg>),
+    /// A call of a standard function that has outputs instead of a result; argument 0 is IN, the others are outputs, counted from 1.
+    Split(crate::st::functions::Function, Vec<Arg>),
     /// EXIT
     Exit,
     /// CONTINUE

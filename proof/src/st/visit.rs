@@ -30,7 +30,7 @@ pub(crate) fn each<'t>(list: &'t [Stmt], see: &mut dyn FnMut(Node<'t>)) {
                 each_in_place(place, see);
                 each_in_args(args, see);
             }
-            Stmt::Do(_, args) => each_in_args(args, see),
+            Stmt::Do(_, args) | Stmt::Split(_, args) => each_in_args(args, see),
             Stmt::Exit | Stmt::Continue | Stmt::Return => {}
         }
         bodies(stmt).into_iter().for_each(|body| each(body, see));
@@ -79,7 +79,13 @@ pub(crate) fn bodies(stmt: &Stmt) -> Vec<&Vec<Stmt>> {
         Stmt::If(branches, otherwise) => branches.iter().map(|(_, body)| body).chain([otherwise]).collect(),
         Stmt::Case(_, branches, otherwise) => branches.iter().map(|(_, body)| body).chain([otherwise]).collect(),
         Stmt::For(.., body) | Stmt::While(.., body) | Stmt::Repeat(.., body) => vec![body],
-        Stmt::Assign(..) | Stmt::Call(..) | Stmt::Do(..) | Stmt::Exit | Stmt::Continue | Stmt::Return => Vec::new(),
+        Stmt::Assign(..)
+        | Stmt::Call(..)
+        | Stmt::Do(..)
+        | Stmt::Split(..)
+        | Stmt::Exit
+        | Stmt::Continue
+        | Stmt::Return => Vec::new(),
     }
 }
 
@@ -89,7 +95,13 @@ pub(crate) fn bodies_mut(stmt: &mut Stmt) -> Vec<&mut Vec<Stmt>> {
         Stmt::If(branches, otherwise) => branches.iter_mut().map(|(_, body)| body).chain([otherwise]).collect(),
         Stmt::Case(_, branches, otherwise) => branches.iter_mut().map(|(_, body)| body).chain([otherwise]).collect(),
         Stmt::For(.., body) | Stmt::While(.., body) | Stmt::Repeat(.., body) => vec![body],
-        Stmt::Assign(..) | Stmt::Call(..) | Stmt::Do(..) | Stmt::Exit | Stmt::Continue | Stmt::Return => Vec::new(),
+        Stmt::Assign(..)
+        | Stmt::Call(..)
+        | Stmt::Do(..)
+        | Stmt::Split(..)
+        | Stmt::Exit
+        | Stmt::Continue
+        | Stmt::Return => Vec::new(),
     }
 }
 
@@ -131,6 +143,7 @@ pub(crate) fn change(list: &mut [Stmt], with: &mut dyn FnMut(Change<'_>)) {
                 change_args(args, with);
                 with(Change::Function(*unit, args));
             }
+            Stmt::Split(_, args) => change_args(args, with),
             Stmt::Exit | Stmt::Continue | Stmt::Return => {}
         }
         bodies_mut(stmt).into_iter().for_each(|body| change(body, with));
