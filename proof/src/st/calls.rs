@@ -276,6 +276,11 @@ impl Generator {
             let inner = self.expr(from, depth);
             return wrap(std(Kind::Dint, Function::Trunc, vec![inner]));
         }
+        if self.r.chance(6)
+            && let Some(bound) = self.bound(if kind == Kind::Dint { Kind::Lint } else { Kind::Dint })
+        {
+            return wrap(bound);
+        }
         if kind != Kind::Dint && self.r.chance(6) {
             // DAY_OF_WEEK gives a DINT there, too.
             let of = self.r.one_of([Kind::Ldate, Kind::Ldate, Kind::Date]);

@@ -62,8 +62,15 @@ impl Settler<'_> {
     /// The value of an expression that reads nothing but literals and constants.
     fn value(&mut self, expr: &Expr) -> Option<Value> {
         let mut is_constant = true;
+        let mut is_bounded = false;
         each_in_expr(expr, &mut |node| {
             is_constant &= match node {
+                // A bound is known without a look into its array, of which nothing is indexed.
+                Node::Place(_) if std::mem::take(&mut is_bounded) => true,
+                Node::Expr(Expr { kind: ExprKind::Std(Function::LowerBound | Function::UpperBound, _), .. }) => {
+                    is_bounded = true;
+                    true
+                }
                 Node::Place(place) => self.is_constant(place),
                 Node::Expr(expr) => !matches!(expr.kind, ExprKind::Call(..)),
                 Node::Stmt(_) => false,

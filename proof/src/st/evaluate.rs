@@ -319,6 +319,7 @@ impl<'s> Evaluator<'s> {
                 let value = self.expr(context, inner)?;
                 converted(inner.ty, expr.ty, value, matches!(expr.kind, ExprKind::Trunc(_)))
             }
+            ExprKind::Std(Function::LowerBound | Function::UpperBound, _) => Value::Int(self.bound(expr)),
             ExprKind::Std(function, inputs) => {
                 let values = inputs.iter().map(|input| self.expr(context, input)).collect::<Result<Vec<_>, _>>()?;
                 let found = standard(*function, kind(expr.ty), &values);
@@ -333,6 +334,19 @@ impl<'s> Evaluator<'s> {
                 self.call_function(context, *unit, args, Key::of_expr(expr))?
             }
         })
+    }
+
+    /// A bound of an array, which its declaration says: nothing is read.
+    fn bound(&self, expr: &Expr) -> i128 {
+        let ExprKind::Std(function, inputs) = &expr.kind else { panic!("a bound of {expr:?}") };
+        let [Expr { ty: Ty::N(id), .. }, Expr { kind: ExprKind::Lit(Value::Int(number), _), .. }] = inputs.as_slice()
+        else {
+            panic!("a bound of {inputs:?}")
+        };
+        let Def::Array(dims, _) = &self.source.types[*id].def else { panic!("a bound of {id}") };
+        // A number that the shrinker made has no dimension, and the compiler refuses it.
+        let (low, high) = usize::try_from(number - 1).ok().and_then(|at| dims.get(at)).copied().unwrap_or_default();
+        i128::from(if *function == Function::UpperBound { high } else { low })
     }
 
     /// Evaluates EN; where it is FALSE, ENO is too.

@@ -152,6 +152,11 @@ impl Generator {
                 let value = self.number(kind);
                 return lit(kind, value, false);
             }
+            if self.r.chance(6)
+                && let Some(bound) = self.bound(kind)
+            {
+                return bound;
+            }
             if self.r.chance(12) {
                 return self.widened(kind, depth, |from, to| from.meet(to) == Some(to));
             }

@@ -204,6 +204,33 @@ impl Generator {
         Some(Expr { ty, kind: ExprKind::Get(Place { base: Base::Var(at), steps: Vec::new(), ty }) })
     }
 
+    /// A bound of an array that is declared, as a number of a type: like a literal it takes what type is wanted.
+    pub(super) fn bound(&mut self, kind: Kind) -> Option<Expr> {
+        let is_array = |shape: &&Shape| {
+            shape.ways.iter().all(|way| matches!(way, Way::Field(_)))
+                && matches!(shape.ty, Ty::N(id) if matches!(self.source.types[id].def, Def::Array(..)))
+        };
+        let arrays: Vec<Shape> = self.shapes.iter().filter(is_array).cloned().collect();
+        let array = self.r.pick(&arrays)?.clone();
+        let Ty::N(id) = array.ty else { return None };
+        let Def::Array(dims, _) = &self.source.types[id].def else { return None };
+        let (dims, at) = (dims.clone(), self.r.below(dims.len()));
+        let function = self.r.one_of([Function::LowerBound, Function::UpperBound]);
+        let value = i128::from(if function == Function::UpperBound { dims[at].1 } else { dims[at].0 });
+        let (least, most) = kind.limits();
+        if !kind.is_integer() || !(least..=most).contains(&value) {
+            return None;
+        }
+        let steps =
+            array.ways.iter().filter_map(|way| if let Way::Field(at) = way { Some(Step::Field(*at)) } else { None });
+        let place = Place { base: array.base, steps: steps.collect(), ty: array.ty };
+        let array = Expr { ty: array.ty, kind: ExprKind::Get(place) };
+        Some(Expr {
+            ty: Ty::K(kind),
+            kind: ExprKind::Std(function, vec![array, lit(Kind::Dint, at as i128 + 1, false)]),
+        })
+    }
+
     fn index(&mut self, low: i32, high: i32) -> Expr {
         let (low, high) = (i128::from(low), i128::from(high));
         let around: Vec<usize> =
@@ -211,6 +238,11 @@ impl Generator {
         if let Some(at) = self.r.pick(&around).copied().filter(|_| self.r.chance(70)) {
             let ty = self.unit.vars[at].ty;
             return Expr { ty, kind: ExprKind::Get(Place { base: Base::Var(at), steps: Vec::new(), ty }) };
+        }
+        if self.r.chance(6)
+            && let Some(bound) = self.bound(Kind::Dint).filter(|_| !self.is_pure)
+        {
+            return bound;
         }
         let literal = lit(Kind::Dint, i128::from(self.r.between(low as i64, high as i64)), false);
         if self.r.chance(45) {
