@@ -43,6 +43,7 @@ impl Generator {
             reserved: false,
             at: None,
             retain: false,
+            edge: None,
             gone: false,
         });
         number

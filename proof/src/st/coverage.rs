@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::functions::row;
 use super::generate::Size;
 use super::moments;
-use super::tree::{Arg, Base, Class, Def, ExprKind, Kind, Op, Source, Step, Stmt, Ty, UnitKind};
+use super::tree::{Arg, Base, Class, Def, Edge, ExprKind, Kind, Op, Source, Step, Stmt, Ty, UnitKind};
 use super::visit::{Node, each};
 use crate::campaign::Figures;
 use khz_bytecode::trap::TrapCode;
@@ -14,7 +14,7 @@ use khz_machine::library::functions::{ResultRule, TABLE};
 
 /// Everything of the language that is no function, block, conversion or operator. A program with one that does not stand here is a panic, and a search of some
 /// size has to reach each of them.
-pub const FEATURES: [&str; 53] = [
+pub const FEATURES: [&str; 55] = [
     "=>",
     "ARRAY",
     "AT",
@@ -26,10 +26,12 @@ pub const FEATURES: [&str; 53] = [
     "ENO",
     "EXIT",
     "FOR",
+    "F_EDGE",
     "IF",
     "NOT",
     "REPEAT",
     "RETAIN",
+    "R_EDGE",
     "RETURN",
     "SINGLE",
     "SINGLE and INTERVAL",
@@ -235,6 +237,7 @@ impl Found {
                 self.features.insert("function without result");
             }
             for var in &unit.vars {
+                self.features.extend(var.edge.map(|edge| if edge == Edge::Rising { "R_EDGE" } else { "F_EDGE" }));
                 self.features.insert(match var.class {
                     Class::Input => "VAR_INPUT",
                     Class::Output => "VAR_OUTPUT",

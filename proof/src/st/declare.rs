@@ -2,7 +2,7 @@
 
 use super::blocks::Standard;
 use super::generate::Generator;
-use super::tree::{At, Class, Def, Kind, Source, Ty, Type, UnitKind, Value, Var};
+use super::tree::{At, Class, Def, Edge, Kind, Source, Ty, Type, UnitKind, Value, Var};
 
 impl Generator {
     pub(super) fn types(&mut self) {
@@ -131,7 +131,7 @@ impl Generator {
         let at = if class == Class::Var { self.located(ty, 15) } else { None };
         let init = if at.is_some() { None } else { self.init(ty, if class == Class::Constant { 100 } else { 50 }) };
         let retain = class == Class::Var && at.is_none() && self.r.chance(10);
-        self.source.globals.push(Var { name, ty, class, init, reserved: false, at, retain, gone: false });
+        self.source.globals.push(Var { name, ty, class, init, reserved: false, at, retain, edge: None, gone: false });
     }
 
     /// Sometimes an address. Floats have none, because bits from outside need be no number that the language knows.
@@ -153,7 +153,7 @@ impl Generator {
         let init = if at.is_some() { None } else { self.init(ty, percent) };
         let may_retain = self.unit.kind != UnitKind::Function && class == Class::Var && at.is_none();
         let retain = may_retain && self.r.chance(8);
-        self.unit.vars.push(Var { name, ty, class, init, reserved: false, at, retain, gone: false });
+        self.unit.vars.push(Var { name, ty, class, init, reserved: false, at, retain, edge: None, gone: false });
     }
 
     /// Whether values of a type may be assigned whole.
@@ -226,9 +226,21 @@ impl Generator {
 
     fn parameters(&mut self, kind: UnitKind) {
         let is_program = kind == UnitKind::Program;
+        let may_rise = kind != UnitKind::Function;
         for number in 0..self.r.between(0, 3) {
-            let ty = if is_program { self.single_type() } else { self.whole_type() };
+            let ty = match self.r.chance(20) {
+                true if may_rise => Ty::K(Kind::Bool),
+                _ if is_program => self.single_type(),
+                _ => self.whole_type(),
+            };
             self.declare(format!("in{number}"), ty, Class::Input);
+            if may_rise
+                && ty == Ty::K(Kind::Bool)
+                && self.r.chance(70)
+                && let Some(input) = self.unit.vars.last_mut()
+            {
+                input.edge = Some(self.r.one_of([Edge::Rising, Edge::Falling]));
+            }
         }
         for number in 0..self.r.between(0, 2) {
             let ty = self.single_type();

@@ -9,7 +9,7 @@ use super::memory::{Memory, Ref};
 use super::moments;
 use super::position::Key;
 use super::text;
-use super::tree::{Arg, Base, Class, Def, Expr, ExprKind, Kind, Op, Place, Source, Step, Stmt, Ty, Value};
+use super::tree::{Arg, Base, Class, Def, Edge, Expr, ExprKind, Kind, Op, Place, Source, Step, Stmt, Ty, Value};
 
 /// Why a scan did not come to its end.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -202,9 +202,24 @@ impl<'s> Evaluator<'s> {
         Stop::Trap(code, values)
     }
 
+    /// Where an instance of a unit has what its body sees of an input with an edge; the input at the last call is next to it.
+    fn edge(&self, unit: usize, number: usize) -> usize {
+        let vars = &self.source.units[unit].vars;
+        vars.len() + 2 * vars[..number].iter().filter(|var| var.edge.is_some()).count()
+    }
+
     /// Runs a unit's statements with fresh VAR_TEMP.
     fn body(&mut self, context: &Context) -> Result<(), Stop> {
         let unit = &self.source.units[context.unit];
+        for (at, var) in unit.vars.iter().enumerate() {
+            let Some(edge) = var.edge else { continue };
+            let seen = self.edge(context.unit, at);
+            let now = self.memory.read(&context.me.child(at));
+            let last = self.memory.read(&context.me.child(seen + 1));
+            let is_edge = now != last && (now.int() != 0) == (edge == Edge::Rising);
+            self.memory.write(&context.me.child(seen), Value::Int(i128::from(is_edge)));
+            self.memory.write(&context.me.child(seen + 1), now);
+        }
         for (at, var) in unit.vars.iter().enumerate().filter(|(_, var)| var.class == Class::Temp) {
             let first = self.source.first(var);
             *self.memory.at(&context.me.child(at)) = first;
@@ -224,7 +239,8 @@ impl<'s> Evaluator<'s> {
             }
             Base::Var(number) => {
                 let var = &self.source.units[context.unit].vars[number];
-                let own = || var.at.map_or_else(|| context.me.child(number), |at| Ref::image(at, kind(var.ty)));
+                let seen = if var.edge.is_some() { self.edge(context.unit, number) } else { number };
+                let own = || var.at.map_or_else(|| context.me.child(seen), |at| Ref::image(at, kind(var.ty)));
                 (context.in_outs.get(&number).cloned().unwrap_or_else(own), var.ty)
             }
         }

@@ -350,6 +350,7 @@ impl Generator {
             reserved: true,
             at: None,
             retain: false,
+            edge: None,
             gone: false,
         });
         self.unit.vars.len() - 1

@@ -4,7 +4,8 @@ use super::functions::{Function, row};
 use super::position::{Key, Positions};
 use super::spelling::{Style, address, type_name};
 use super::tree::{
-    Arg, Base, Class, Config, Def, Expr, ExprKind, Kind, Op, Place, Source, Step, Stmt, Ty, Unit, UnitKind, Value, Var,
+    Arg, Base, Class, Config, Def, Edge, Expr, ExprKind, Kind, Op, Place, Source, Step, Stmt, Ty, Unit, UnitKind,
+    Value, Var,
 };
 
 /// The text of a program. The parentheses are those that precedence needs.
@@ -142,7 +143,12 @@ impl<'s> Printer<'s> {
         };
         let init = var.init.as_ref().map(|value| format!(" := {}", self.style.initial(self.source, var.ty, value)));
         let ty = type_name(self.source, var.ty);
-        self.line(&format!("  {}{at} : {ty}{};", var.name, init.unwrap_or_default()));
+        let edge = match var.edge {
+            None => "",
+            Some(Edge::Rising) => " R_EDGE",
+            Some(Edge::Falling) => " F_EDGE",
+        };
+        self.line(&format!("  {}{at} : {ty}{edge}{};", var.name, init.unwrap_or_default()));
     }
 
     fn unit(&mut self, unit: &'s Unit, startup: bool) {

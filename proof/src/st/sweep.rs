@@ -157,6 +157,7 @@ impl Used<'_> {
 /// Makes a parameter a variable of its own and takes its arguments out of all calls.
 pub(crate) fn drop_parameter(source: &mut Source, unit: usize, at: usize) {
     source.units[unit].vars[at].class = Class::Var;
+    source.units[unit].vars[at].edge = None;
     let blocks: Vec<Ty> = (0..source.types.len())
         .filter(|id| matches!(source.types[*id].def, Def::Block(of) if of == unit))
         .map(Ty::N)

@@ -369,6 +369,14 @@ pub enum Class {
     Return,
 }
 
+/// Of an input the body sees only that it rose or fell since the last call.
+#[allow(missing_docs, reason = "the names are the standard's")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Edge {
+    Rising,
+    Falling,
+}
+
 /// A variable.
 #[derive(Debug, Clone)]
 pub struct Var {
@@ -386,6 +394,8 @@ pub struct Var {
     pub at: Option<At>,
     /// Declared RETAIN.
     pub retain: bool,
+    /// What of an input its body sees.
+    pub edge: Option<Edge>,
     /// The shrinker took its declaration out.
     pub gone: bool,
 }
@@ -645,7 +655,11 @@ impl Source {
     /// The variables of a unit before it first runs.
     #[must_use]
     pub fn instance(&self, unit: usize) -> Value {
-        Value::Many(self.units[unit].vars.iter().map(|var| self.first(var)).collect())
+        let vars = &self.units[unit].vars;
+        let edges = vars.iter().filter(|var| var.edge.is_some());
+        // Behind the variables, for each edge: what the body sees, and the input at the last call.
+        let hidden = edges.flat_map(|_| [Value::Int(0), Value::Int(0)]);
+        Value::Many(vars.iter().map(|var| self.first(var)).chain(hidden).collect())
     }
 
     /// The initial value of a variable.

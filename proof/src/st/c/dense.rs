@@ -20,7 +20,17 @@ pub fn dense(seed: u64) -> Source {
         let ty = Ty::K(kinds[number / 2]);
         let init = Some(value(&source, ty, &mut random));
         let name = format!("v{number}");
-        vars.push(Var { name, ty, class: Class::Var, init, reserved: false, at: None, retain: false, gone: false });
+        vars.push(Var {
+            name,
+            ty,
+            class: Class::Var,
+            init,
+            reserved: false,
+            at: None,
+            retain: false,
+            edge: None,
+            gone: false,
+        });
     }
     let mut maker = Maker { random, kinds };
     let mut body = Vec::new();
