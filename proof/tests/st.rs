@@ -118,7 +118,7 @@ fn a_tree_that_means_something_else_is_found() {
 #[test]
 fn a_configuration_that_means_something_else_is_found() {
     let mut found = [0; 3];
-    for seed in 0..400 {
+    for seed in 0..800 {
         let source = khz_proof::st::generate(seed);
         if source.config.is_none() {
             continue;
