@@ -14,7 +14,7 @@ use khz_machine::library::functions::{ResultRule, TABLE};
 
 /// Everything of the language that is no function, block, conversion or operator. A program with one that does not stand here is a panic, and a search of some
 /// size has to reach each of them.
-pub const FEATURES: [&str; 55] = [
+pub const FEATURES: [&str; 56] = [
     "=>",
     "ARRAY",
     "AT",
