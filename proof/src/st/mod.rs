@@ -20,6 +20,7 @@ mod expression;
 mod flow;
 pub mod functions;
 mod generate;
+pub mod kind;
 mod memory;
 pub mod moments;
 mod places;
