@@ -42,12 +42,12 @@ fn is_found(fault: Fault, engine: &str, programs: u64, most_instructions: usize)
 
 #[test]
 fn a_fault_of_the_interpreter_is_found_and_made_small() {
-    is_found(Fault::Interp, "interp", 500, 12);
+    is_found(Fault::Interp, "interp", 500, 20);
 }
 
 #[test]
 fn a_fault_of_native_code_is_found_and_made_small() {
-    is_found(Fault::Jit, "jit", 500, 12);
+    is_found(Fault::Jit, "jit", 500, 20);
 }
 
 #[test]
