@@ -6,7 +6,7 @@ use khz_bytecode::value::IntegerType;
 use super::expr::Checker;
 use khz_bytecode::limits::MAX_LOOP_DEPTH;
 
-use super::tree::{Call, CaseArm, Expr, ExprKind, ForStmt, Place, Step, Stmt, StmtKind};
+use super::tree::{Call, CaseArm, Expr, ExprKind, ForStmt, Place, Step, Stmt, StmtKind, TextOp};
 use super::types::{Const, DINT, Ty, TyKind, integer_type, is_bits, is_integer, limits, widen};
 use crate::diagnostics::{Diagnostic, semantic as names, types as rules};
 use crate::source::Span;
@@ -318,6 +318,10 @@ fn assigned_call(value: &mut Expr) -> Option<&mut Call> {
         ExprKind::Call(call) => Some(call),
         ExprKind::Convert { value: inner, .. } | ExprKind::Check(inner, ..) if inner.span == span => {
             assigned_call(inner)
+        }
+        // A CHAR where a STRING is wanted.
+        ExprKind::Text(TextOp::FromCharacter, inner) => {
+            inner.first_mut().filter(|inner| inner.span == span).and_then(assigned_call)
         }
         _ => None,
     }
