@@ -420,6 +420,12 @@ impl<'s> Evaluator<'s> {
         // Its frame is there from the start, but what it is given is evaluated in the caller's.
         self.memory.frames.push(source.instance(unit));
         let me = Ref::frame(self.memory.frames.len() - 1);
+        // An input that is given does not begin with its initial value: nothing of that stays behind a shorter text.
+        for arg in args {
+            if let Arg::In(at, _) = arg {
+                self.memory.clear_text(&me.child(*at));
+            }
+        }
         let mut in_outs = BTreeMap::new();
         self.inputs(context, &me, unit, args, &mut in_outs)?;
         self.calls.push(at);

@@ -96,6 +96,13 @@ impl Memory {
         }
     }
 
+    /// A string without any characters, behind its end neither.
+    pub(super) fn clear_text(&mut self, place: &Ref) {
+        if let Value::Str(room) = self.at(place) {
+            room.fill(0);
+        }
+    }
+
     pub(super) fn write(&mut self, place: &Ref, value: Value) {
         let value = match place.part {
             Some((first, count, kind)) => {
